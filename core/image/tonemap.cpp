@@ -2,14 +2,12 @@
 #include <cmath>
 
 #include "core/image/png.h"
+#include "core/math/vec.h"
 
 namespace bakewell {
 namespace {
 
 constexpr float kWhitePoint = 0.8f;  // display value of the 95th percentile; above it the shoulder begins
-
-// Rec. 709 luminance (theory.md 1).
-float Luminance(float r, float g, float b) { return 0.2126f * r + 0.7152f * g + 0.0722f * b; }
 
 // Luminances of covered, finite pixels; all finite pixels where the page has no A.
 std::vector<float> CoveredLuminances(const Image& image) {
@@ -18,7 +16,7 @@ std::vector<float> CoveredLuminances(const Image& image) {
   std::vector<float> values;
   for (size_t i = 0; i < image.PixelCount(); ++i) {
     if (a >= 0 && !(image.Channel(a)[i] > 0)) continue;
-    const float y = Luminance(image.Channel(r)[i], image.Channel(g)[i], image.Channel(b)[i]);
+    const float y = Luminance(Rgb{image.Channel(r)[i], image.Channel(g)[i], image.Channel(b)[i]});
     if (std::isfinite(y)) values.push_back(y);
   }
   return values;
