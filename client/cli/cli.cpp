@@ -27,6 +27,10 @@ int ExitCode(absl::StatusCode code) {
   }
 }
 
+bool HasCommand(CLI::App& app, const std::string& name) {
+  return !app.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; }).empty();
+}
+
 }  // namespace
 
 int ReportError(const absl::Status& status, OutputForm form, const Console& console) {
@@ -49,6 +53,10 @@ int RunCli(int argc, const char* const* argv, const Console& console, const Bake
   AddBakeCommand(app, console, bakers, &exit_code);
   AddReferenceCommand(app, console, bakers, &exit_code);
   AddCompareCommand(app, console, &exit_code);
+  if (argc > 1 && argv[1][0] != '-' && !HasCommand(app, argv[1])) {
+    console.err << "bakewell: there is no command " << argv[1] << "; bakewell --help lists them" << std::endl;
+    return kExitUserError;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
