@@ -28,7 +28,7 @@ class PathNumbers {
   }
   void Restart(uint32_t index) { index_ = index; }
   float Get(int bounce, int dimension) const {
-    if (bounce < kSobolBounces) return sets_[bounce].Get(index_, dimension);
+    if (bounce < kSobolBounces) return sets_[bounce].At(index_).Get(dimension);
     const uint32_t what = static_cast<uint32_t>(16 * bounce + dimension);
     return UnitFloat(HashCombine(HashCombine(key_, index_), what));
   }

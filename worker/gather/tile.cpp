@@ -106,10 +106,11 @@ class TileGatherer {
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
     const SobolSet set(HashCombine(work.key, 0x6a7e2u));
     for (uint32_t i = begin; i < end; ++i) {
-      const TexelPoint point = work.sampler.At(set.Get2(i, 2));
+      const SobolPoint u = set.At(i);
+      const TexelPoint point = work.sampler.At(u.Get2(2));
       if (!point.valid) continue;
       work.indirect.Count();
-      const Vec3f local = GatherHemisphere(set.Get2(i, 0));
+      const Vec3f local = GatherHemisphere(u.Get2(0));
       const Vec3f dir = point.frame.ToWorld(local);
       const float pdf = GatherPdf(local.z);
       const uint32_t ray_key = HashCombine(work.key, 0x80000000u | i);

@@ -63,32 +63,31 @@ class Emitter {
   Emitter(const World& world, const LightSet& lights, const EmissionGuide& guide, const PhotonPlan& plan)
       : world_(world), lights_(lights), guide_(guide), plan_(plan) {}
 
-  Photon Emit(const PhotonSource& source, const SobolSet& set, int64_t photon) const {
-    const uint32_t i = static_cast<uint32_t>(photon - source.first);
-    Photon result = Draw(source, set, i);
+  Photon Emit(const PhotonSource& source, const SobolPoint& u, int64_t photon) const {
+    Photon result = Draw(source, u);
     result.key = HashCombine(HashCombine(plan_.seed, 0x9107u), HashWide(static_cast<uint64_t>(photon)));
     return result;
   }
 
  private:
-  Photon Draw(const PhotonSource& source, const SobolSet& set, uint32_t i) const {
+  Photon Draw(const PhotonSource& source, const SobolPoint& u) const {
     const double n = static_cast<double>(source.count);
     if (source.kind == PhotonSource::Kind::kDirectional) {
-      const LightSample sun = lights_.SampleDirectional(source.light, set.Get2(i, 2));
+      const LightSample sun = lights_.SampleDirectional(source.light, u.Get2(2));
       Frame frame = SunFrame(lights_.directionals()[source.light]);
-      const auto point = guide_.DrawSun(source.light, set.Get2(i, 0));
+      const auto point = guide_.DrawSun(source.light, u.Get2(0));
       Photon photon = FromSquare(world_, frame, point, lights_.directionals()[source.light].intensity, n);
       photon.origin += (sun.dir - frame.n) * (2 * world_.radius());
       photon.dir = -sun.dir;
       return photon;
     }
     if (source.kind == PhotonSource::Kind::kSky) {
-      const auto sky = guide_.DrawSky(set.Get2(i, 2), set.Get2(i, 0));
+      const auto sky = guide_.DrawSky(u.Get2(2), u.Get2(0));
       return FromSquare(world_, SkyFrame(sky.dir), sky.point, lights_.environment().Radiance(sky.dir) / sky.pdf, n);
     }
-    if (!lights_.IsEmissive(source.light)) return FromPunctual(lights_.locals()[source.light], set.Get2(i, 0), n);
+    if (!lights_.IsEmissive(source.light)) return FromPunctual(lights_.locals()[source.light], u.Get2(0), n);
     const EmissiveTriangle& triangle = lights_.emissive()[static_cast<size_t>(source.light) - lights_.locals().size()];
-    return FromTriangle(world_, triangle, set.Get2(i, 2), set.Get2(i, 0), set.Get(i, 7), n);
+    return FromTriangle(world_, triangle, u.Get2(2), u.Get2(0), u.Get(7), n);
   }
 
   const World& world_;
@@ -107,7 +106,7 @@ class Tracer {
   Tracer(const World& world, const SurfaceCells& cells, double scale, PhotonMap& map)
       : world_(world), cells_(cells), scale_(scale), map_(map) {}
 
-  void Trace(const Photon& photon, const SobolSet& set, uint32_t index, int group) {
+  void Trace(const Photon& photon, const SobolPoint& u, int group) {
     Ray ray{photon.origin, photon.dir, kInfinity, photon.key};
     Rgb flux = photon.flux;
     Accumulate(totals_.emitted, ToFixed(flux));
@@ -121,15 +120,15 @@ class Tracer {
       const float survive = MaxComponent(albedo);
       const Fixed before = ToFixed(flux);
       if (bounce + 1 == kMaxPhotonBounces) ++totals_.cut_paths;
-      if (Random(photon, set, index, bounce, 2) >= survive || bounce + 1 == kMaxPhotonBounces) {
+      if (Random(photon, u, bounce, 2) >= survive || bounce + 1 == kMaxPhotonBounces) {
         return Accumulate(totals_.absorbed, before);
       }
       flux = flux * albedo / survive;
       const Fixed after = ToFixed(flux);
       Accumulate(totals_.absorbed, {before[0] - after[0], before[1] - after[1], before[2] - after[2]});
       const Frame frame = FrameFromHint(point.normal, world_.triangles()[hit.triangle].e1);
-      const Vec2f u{Random(photon, set, index, bounce, 0), Random(photon, set, index, bounce, 1)};
-      ray = {RayOrigin(point), frame.ToWorld(CosineHemisphere(u)), kInfinity, photon.key + static_cast<uint32_t>(bounce) + 1};
+      const Vec2f scatter{Random(photon, u, bounce, 0), Random(photon, u, bounce, 1)};
+      ray = {RayOrigin(point), frame.ToWorld(CosineHemisphere(scatter)), kInfinity, photon.key + static_cast<uint32_t>(bounce) + 1};
     }
   }
 
@@ -147,8 +146,8 @@ class Tracer {
 
  private:
   // The first scattering follows the emission's Sobol points, later ones hashed numbers.
-  float Random(const Photon& photon, const SobolSet& set, uint32_t index, int bounce, int what) const {
-    if (bounce == 0) return set.Get(index, 4 + what);
+  float Random(const Photon& photon, const SobolPoint& u, int bounce, int what) const {
+    if (bounce == 0) return u.Get(4 + what);
     return UnitFloat(HashCombine(photon.key, static_cast<uint32_t>(4 * bounce + what)));
   }
 
@@ -249,9 +248,10 @@ void EmitPhotons(const World& world, const LightSet& lights, const EmissionGuide
     const int64_t first = std::max(begin, source.first), last = std::min(end, source.first + source.count);
     for (int64_t photon = first; photon < last; ++photon) {
       if ((photon & 1023) == 0 && progress.Cancelled()) break;
-      const Photon drawn = emitter.Emit(source, set, photon);
+      const SobolPoint u = set.At(static_cast<uint32_t>(photon - source.first));
+      const Photon drawn = emitter.Emit(source, u, photon);
       BAKEWELL_CHECK_OP(MaxComponent(drawn.flux), <=, source.max_weight);
-      tracer.Trace(drawn, set, static_cast<uint32_t>(photon - source.first), static_cast<int>(photon % kVarianceGroups));
+      tracer.Trace(drawn, u, static_cast<int>(photon % kVarianceGroups));
     }
   }
   tracer.Flush();

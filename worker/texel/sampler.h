@@ -13,12 +13,13 @@ struct TexelPoint {
   bool valid = true;  // false inside other geometry: the sample does not count
 };
 
-// Draws points uniformly over the covered area of one texel.
+// Draws points uniformly over the covered part of one texel's footprint (the square of side TexelMap::footprint about its
+// centre), or over all of the texel that is covered where the footprint holds no surface.
 class TexelSampler {
  public:
   TexelSampler(const World& world, const AtlasLayout& layout, const TexelMap& map, const Texel& texel);
 
-  // Pdf 1/covered area. Points in the parts that `valid_mask` rules out come back with valid == false.
+  // Pdf 1/(covered area of the footprint). Points in the parts that `valid_mask` rules out come back with valid == false.
   TexelPoint At(Vec2f u) const;
   // The bit of valid_mask that decides about At(u).
   int BitAt(Vec2f u) const;
@@ -50,7 +51,12 @@ class TexelSampler {
   };
   Place Find(Vec2f u) const;
   static int MaskBit(Place place);
-  void AddFragment(const World& world, const AtlasLayout& layout, const TexelFragment& fragment, int x, int y);
+  struct Window {
+    Vec2d corner;
+    double side;
+  };
+  void AddFragment(const World& world, const AtlasLayout& layout, const TexelFragment& fragment, const Window& window,
+                   Vec2d texel);
 
   std::vector<Part> parts_;
   std::vector<Side> sides_;

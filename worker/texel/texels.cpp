@@ -122,8 +122,9 @@ std::array<Vec2d, 3> TexelCorners(const World& world, const AtlasLayout& layout,
   return corners;
 }
 
-TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout) {
+TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout, float footprint) {
   TexelMap map;
+  map.footprint = footprint;
   map.pages = layout.pages;
   for (const PageSize& page : layout.pages) {
     map.texel_at.emplace_back(static_cast<size_t>(page.width) * static_cast<size_t>(page.height), -1);

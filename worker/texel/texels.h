@@ -39,14 +39,15 @@ struct TexelMap {
   // Texels [tile_begin[k], tile_begin[k+1]) are tile k.
   std::vector<uint32_t> tile_begin;
   int64_t overlapping_texels = 0;  // covered by more than one chart
+  float footprint = 1;             // side of the square about a texel's centre that its value averages [texels]
 
   int tile_count() const { return static_cast<int>(tile_begin.size()) - 1; }
 };
 
 inline constexpr int kTileSide = 16;
 
-// Rasterises every charted triangle exactly: area of texel and triangle clipped, not centres.
-TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout);
+// Rasterises every charted triangle exactly: area of texel and triangle clipped, not centres. footprint is in (0, 1].
+TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout, float footprint);
 
 // Corners of a charted triangle on its page [texels].
 std::array<Vec2d, 3> TexelCorners(const World& world, const AtlasLayout& layout, uint32_t triangle);
