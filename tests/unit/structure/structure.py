@@ -22,7 +22,7 @@ ALLOWED_FOLDERS = {
 ALLOWED_LIBRARIES = {
     r"absl/": SOURCE_FOLDERS,
     r"embree\d/": ("worker/trace",),
-    r"tbb/|oneapi/": ("worker",),
+    r"tbb/|oneapi/": ("worker", "server", "client/local"),  # threads, as the standard library's
     r"OpenMesh/": ("server/chart",),
     r"Eigen/": ("server/chart",),
     r"sqlite3|SQLiteCpp/": ("server/store",),
@@ -39,8 +39,8 @@ ALLOWED_LIBRARIES = {
 }
 
 # The standard library has no dot; these are the C library and the operating system.
-SYSTEM_HEADER = re.compile(r"[a-z_]+|(sys|netinet|arpa|linux)/\w+\.h|(unistd|fcntl|signal|pthread|dirent|poll|immintrin|"
-                           r"x86intrin|cpuid|time|errno|stdio|stdlib|string|math|stdint)\.h")
+SYSTEM_HEADER = re.compile(r"[a-z_]+|(sys|netinet|arpa|linux)/\w+\.h|(unistd|fcntl|signal|pthread|dirent|poll|\w+intrin|"
+                           r"cpuid|time|errno|stdio|stdlib|string|math|stdint)\.h")
 INCLUDE = re.compile(r'^\s*#\s*include\s*(?:"([^"]+)"|<([^>]+)>)', re.MULTILINE)
 FORBIDDEN_NAMES = {"common", "misc", "helpers", "utils", "util", "manager"}
 LONGEST_SOURCE, LONGEST_HEADER = 450, 150
@@ -105,13 +105,22 @@ def LibraryFaults(tree):
     return faults
 
 
+def NearestList(path, tree):
+    """The folder of the CMakeLists.txt that has to name `path`: its own folder's, or else the next one above."""
+    folder = path.rpartition("/")[0]
+    while "/" in folder and f"{folder}/CMakeLists.txt" not in tree:
+        folder = folder.rpartition("/")[0]
+    return folder
+
+
 def RegistrationFaults(tree):
-    """Every .cpp is named in its own folder's CMakeLists.txt, and so is every *_test.py."""
+    """Every .cpp and every *_test.py is named, relative to it, in the nearest CMakeLists.txt."""
     faults = []
     for path in tree:
-        folder, _, name = path.rpartition("/")
-        if not (name.endswith(".cpp") or name.endswith("_test.py")):
+        if not path.endswith((".cpp", "_test.py")):
             continue
+        folder = NearestList(path, tree)
+        name = path[len(folder) + 1:]
         listed = re.sub(r"#.*", "", tree.get(f"{folder}/CMakeLists.txt", ""))
         if not re.search(rf"(?<![\w./-]){re.escape(name)}(?![\w.])", listed):
             faults.append(f"{path} is not listed in {folder}/CMakeLists.txt: nothing builds or runs it")

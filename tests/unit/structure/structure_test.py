@@ -75,6 +75,8 @@ class EachRule(unittest.TestCase):
         for text in ("", "bakewell_test(a SOURCES aa_test.cpp)", "# a_test.cpp", "x(other/a_test.cpp)"):
             self.assertEqual(len(structure.RegistrationFaults({**listed, "tests/unit/CMakeLists.txt": text})), 1, text)
         self.assertEqual(len(structure.RegistrationFaults({"tests/unit/a_test.cpp": ""})), 1)
+        nested = {"server/chart/CMakeLists.txt": "x(pack/a.cpp)", "server/chart/pack/a.cpp": "", "server/chart/pack/b.cpp": ""}
+        self.assertEqual(len(structure.RegistrationFaults(nested)), 1)
 
     def test_subdirectories(self):
         tree = {"tests/CMakeLists.txt": "add_subdirectory(unit)", "tests/unit/CMakeLists.txt": "", "tests/golden/CMakeLists.txt": ""}
