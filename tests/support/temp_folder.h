@@ -2,7 +2,9 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
+#include <string_view>
 
 #include "core/base/check.h"
 
@@ -29,5 +31,13 @@ class TempFolder {
  private:
   std::filesystem::path path_;
 };
+
+// Writes a file without syncing it: for tests that write thousands.
+inline void WriteQuickly(const std::filesystem::path& path, std::string_view bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  BAKEWELL_CHECK(file.good());
+}
 
 }  // namespace bakewell
