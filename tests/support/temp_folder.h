@@ -32,8 +32,10 @@ class TempFolder {
   std::filesystem::path path_;
 };
 
-// Writes a file without syncing it: for tests that write thousands.
+// Writes a file without syncing it, for tests that write thousands. ext4 syncs a file that is truncated and written
+// again, so an old one is removed first.
 inline void WriteQuickly(const std::filesystem::path& path, std::string_view bytes) {
+  std::filesystem::remove(path);
   std::ofstream file(path, std::ios::binary);
   file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   file.close();
