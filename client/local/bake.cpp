@@ -24,6 +24,16 @@ tbb::global_control Threads(int threads) {
   return {tbb::global_control::max_allowed_parallelism, count};
 }
 
+absl::StatusOr<PreparedLevel> LoadAndPrepare(const std::filesystem::path& path, const BakeSettings& settings, PhaseClock& clock,
+                                             Progress& progress) {
+  clock.Begin("load");
+  BAKEWELL_ASSIGN_OR_RETURN(LoadedLevel level, LoadLevel(path));
+  clock.End();
+  auto prepared = PrepareLevel(std::move(level), settings, clock, progress);
+  if (prepared.ok() || absl::IsCancelled(prepared.status())) return prepared;
+  return absl::Status(prepared.status().code(), path.string() + ": " + std::string(prepared.status().message()));
+}
+
 double EstimatedError(std::span<const TexelLight> lights) {
   double variance = 0, sum = 0, count = 0;
   for (const TexelLight& light : lights) {
@@ -94,7 +104,6 @@ absl::Status WriteScene(const BakeRequest& request, const PreparedLevel& prepare
 
 Manifest MakeManifest(const std::filesystem::path& scene_path, const BakeSettings& settings, const PreparedLevel& prepared) {
   Manifest manifest;
-  manifest.version = BAKEWELL_VERSION;
   manifest.scene_file = scene_path.filename().string();
   manifest.scene_digest = SceneDigest(prepared.level->scene);
   manifest.settings_json = SettingsJson(settings);
@@ -157,7 +166,7 @@ absl::StatusOr<BakeSummary> Bake(const BakeRequest& request, Progress& progress)
   const double wall = PhaseClock::WallSeconds(), cpu = PhaseClock::CpuSeconds();
   const tbb::global_control threads = Threads(request.threads);
   PhaseClock clock;
-  BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared, PrepareLevel(request.scene_path, request.settings, clock, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared, LoadAndPrepare(request.scene_path, request.settings, clock, progress));
   BAKEWELL_ASSIGN_OR_RETURN(const BakedTexels baked, BakeTexels(prepared, request.settings, clock, progress));
   BAKEWELL_RETURN_IF_ERROR(CheckSamples(baked.counters));
   BAKEWELL_ASSIGN_OR_RETURN(OutputDir out, OutputDir::Create(request.output_dir));
@@ -215,7 +224,7 @@ absl::StatusOr<BakeSummary> BakeReference(const ReferenceRequest& request, Progr
   const double wall = PhaseClock::WallSeconds(), cpu = PhaseClock::CpuSeconds();
   const tbb::global_control threads = Threads(request.threads);
   PhaseClock clock;
-  BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared, PrepareLevel(request.scene_path, request.settings, clock, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared, LoadAndPrepare(request.scene_path, request.settings, clock, progress));
   Manifest manifest = MakeManifest(request.scene_path, request.settings, prepared);
   clock.Begin("reference");
   const std::vector<ReferenceTexel> texels = TraceReference(*prepared.world, *prepared.lights, prepared.layout, prepared.texels,

@@ -25,7 +25,7 @@ class PhaseClock {
   double wall_ = 0, cpu_ = 0;
 };
 
-// A level on its way through the phases that a bake and a reference share: read, chart, build the world, cut texels.
+// A level on its way through the phases that a bake and a reference share: chart, build the world, cut texels.
 struct PreparedLevel {
   std::unique_ptr<LoadedLevel> level;  // at a fixed address: world and lights refer to its scene
   AtlasLayout layout;
@@ -35,8 +35,7 @@ struct PreparedLevel {
   std::vector<std::string> warnings;
 };
 
-absl::StatusOr<PreparedLevel> PrepareLevel(const std::filesystem::path& scene_path, const BakeSettings& settings,
-                                           PhaseClock& clock, Progress& progress);
+absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings& settings, PhaseClock& clock, Progress& progress);
 
 // Samples, photons and target of a quality, with the settings' own numbers in their place.
 struct Budget {

@@ -80,13 +80,9 @@ void WarnAboutTexels(const TexelMap& texels, std::vector<std::string>& warnings)
 
 }  // namespace
 
-absl::StatusOr<PreparedLevel> PrepareLevel(const std::filesystem::path& scene_path, const BakeSettings& settings,
-                                           PhaseClock& clock, Progress& progress) {
+absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings& settings, PhaseClock& clock, Progress& progress) {
   PreparedLevel prepared;
-  clock.Begin("load");
-  BAKEWELL_ASSIGN_OR_RETURN(LoadedLevel level, LoadLevel(scene_path));
   prepared.level = std::make_unique<LoadedLevel>(std::move(level));
-  clock.End();
   prepared.warnings = prepared.level->warnings;
   Scene& scene = prepared.level->scene;
   if (settings.environment) scene.environment = *settings.environment;
@@ -105,7 +101,7 @@ absl::StatusOr<PreparedLevel> PrepareLevel(const std::filesystem::path& scene_pa
   clock.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
   if (prepared.texels.texels.empty()) {
-    return absl::InvalidArgumentError(scene_path.string() + ": no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");
+    return absl::InvalidArgumentError("no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");
   }
   return prepared;
 }
