@@ -97,8 +97,8 @@ absl::Status WriteScene(const BakeRequest& request, const PreparedLevel& prepare
     const std::string name = PageName(static_cast<int>(page));
     pages.push_back({name + ".irradiance.exr", name + ".sh.exr", name + ".variance.exr"});
   }
-  (void)request; //TMP
-  //  BAKEWELL_RETURN_IF_ERROR(WriteLevel(request.scene_path, *prepared.level, prepared.layout, pages, folder / "scene.glb"));
+
+  BAKEWELL_RETURN_IF_ERROR(WriteLevel(request.scene_path, *prepared.level, prepared.layout, pages, folder / "scene.glb"));
   return PageWriter(folder, files).List("scene.glb", "scene");
 }
 
@@ -176,8 +176,7 @@ absl::StatusOr<BakeSummary> Bake(const BakeRequest& request, Progress& progress)
   BAKEWELL_RETURN_IF_ERROR(WritePages(prepared, baked, out.Staging(), manifest.files, progress));
   clock.End();
   clock.Begin("write");
-  //TMP BAKEWELL_RETURN_IF_ERROR(WriteScene(request, prepared, out.Staging(), manifest.files));
-  (void)&WriteScene;
+  BAKEWELL_RETURN_IF_ERROR(WriteScene(request, prepared, out.Staging(), manifest.files));
   clock.End();
   return Conclude(out, request.output_dir, std::move(manifest), clock, wall, cpu);
 }

@@ -161,18 +161,20 @@ class Estimator {
     }
   }
 
+  // The radius follows from the density of photons in the widest neighbourhood, not from when a growing one happens to
+  // hold enough: that would favour neighbourhoods that are too bright (a bias of about one part in target_count).
   void Average(const CellPatch& patch, int x, int y, int side) {
     const size_t i = Index(patch, x, y, side);
     if (cells_.cells()[i / 2].area <= 0) return;
-    Sum sum;
-    AddCell(i, sum);
     int radius = 0;
-    if (!cut_[i]) {
-      while (sum.count < options_.target_count && radius < options_.max_radius && open_[i] != 0) {
-        sum = Flood(patch, x, y, side, ++radius);
-      }
+    if (!cut_[i] && open_[i] != 0) {
+      const Sum widest = Flood(patch, x, y, side, options_.max_radius);
+      const double per_area = static_cast<double>(widest.count) / widest.area;
+      const double cell_area = static_cast<double>(cells_.cell_size_m()) * static_cast<double>(cells_.cell_size_m());
+      while (radius < options_.max_radius && per_area * cell_area * (2 * radius + 1) * (2 * radius + 1) < options_.target_count) ++radius;
+      if (radius == options_.max_radius) return Store(i, widest, radius);
     }
-    Store(i, sum, radius);
+    Store(i, Flood(patch, x, y, side, radius), radius);
   }
 
   void Store(size_t i, const Sum& sum, int radius) {
