@@ -180,13 +180,6 @@ class LevelLoader {
 
 }  // namespace
 
-absl::StatusOr<Source> ReadSource(const std::filesystem::path& path) {
-  Source source;
-  BAKEWELL_ASSIGN_OR_RETURN(source.document, ReadDocument(path));
-  BAKEWELL_ASSIGN_OR_RETURN(source.model, ToModel(source.document));
-  return source;
-}
-
 absl::StatusOr<LoadedLevel> Load(const std::filesystem::path& path, const LoadLimits& limits) {
   try {
     BAKEWELL_ASSIGN_OR_RETURN(const Source source, ReadSource(path));
