@@ -122,13 +122,13 @@ class LevelWriter {
 
   // One child per instance, in the place of the extension.
   absl::Status ExpandInstances(const PlacedNode& placed) {
-    BAKEWELL_ASSIGN_OR_RETURN(const Instances instances, ReadInstances(source_, placed.node, UINT64_MAX));
+    BAKEWELL_ASSIGN_OR_RETURN(const Instances instances, ReadInstances(source_, placed.node));
     const json original = NodeJson(placed.node);
     NodeJson(placed.node).erase("mesh");
     NodeJson(placed.node)["extensions"].erase(kInstancing);
     if (NodeJson(placed.node)["extensions"].empty()) NodeJson(placed.node).erase("extensions");
-    for (size_t i = 0; i < instances.trs.size(); ++i) {
-      json child = instances.trs[i];
+    for (size_t i = 0; i < instances.node_from_instance.size(); ++i) {
+      json child = NodeOfInstance(instances, i);
       child["mesh"] = original["mesh"];
       child["name"] = absl::StrCat(StringOr(original, {"name"}, "instance"), ".", i);
       if (const json* density = Find(original, {"extras", "lightmapDensity"})) {

@@ -11,7 +11,7 @@ namespace bakewell::gltf {
 
 // The most elements of an accessor that has no bytes behind it (no buffer view): a tiny file must not ask for
 // gigabytes.
-inline constexpr uint64_t kMaxUnbackedElements = uint64_t{1} << 24;
+inline constexpr uint64_t kMaxUnbackedElements = uint64_t{1} << 20;
 
 // All elements of an accessor as doubles, `components` (1 to 4) per element: any component type, normalised integers,
 // byte stride, sparse. kInvalidArgument naming the accessor: another element type, a range that leaves its buffer view,

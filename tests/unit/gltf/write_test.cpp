@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <cstring>
+#include <fstream>
 #include <set>
 
 #include "client/gltf/level.h"
