@@ -145,6 +145,7 @@ class LevelLoader {
     MeanPoint mean;
     for (const WorldObject& object : objects_) AddTo(mean, object);
     Scene& scene = level_.scene;
+    if (objects_.empty()) warnings_.Add("the scene has no triangles");
     scene.origin_ws = mean.Value();
     for (WorldObject& object : objects_) {
       FinishObject(object, scene.origin_ws);

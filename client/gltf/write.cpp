@@ -1,3 +1,5 @@
+#include "client/gltf/level.h"
+
 #include <absl/strings/str_cat.h>
 
 #include <exception>
@@ -9,7 +11,6 @@
 #include "client/gltf/file/output.h"
 #include "client/gltf/file/placement.h"
 #include "client/gltf/file/schema.h"
-#include "client/gltf/level.h"
 #include "client/gltf/primitive.h"
 #include "core/artifact/atomic_file.h"
 #include "core/base/check.h"
