@@ -3,8 +3,10 @@
 #include <cmath>
 #include <optional>
 
+#include "server/chart/flatten/conformal.h"
 #include "server/chart/flatten/overlap.h"
 #include "server/chart/flatten/project.h"
+#include "server/chart/flatten/rigid.h"
 #include "server/chart/flatten/split.h"
 #include "server/chart/flatten/stretch.h"
 
@@ -14,10 +16,6 @@ namespace {
 // Below this a projection is as good as exact: the stretch's own rounding in a float lightmap is of that size.
 constexpr double kExactStretch = 1.00002;
 
-bool IsValid(const Surface& surface, const FlatChart& chart) {
-  return !OutlineCrossesItself(chart.uv, BoundaryEdges(surface, chart));
-}
-
 std::optional<FlatChart> TryFlatten(const Surface& surface, std::span<const uint32_t> faces,
                                     const ChartOptions& options) {
   FlatChart chart = LocalChart(surface, faces);
@@ -26,8 +24,13 @@ std::optional<FlatChart> TryFlatten(const Surface& surface, std::span<const uint
     return chart;
   }
   ProjectOnMeanPlane(surface, chart);
-  const Stretch stretch = MeasureStretch(surface, chart);
-  if (stretch.flipped || stretch.l2 > options.maxStretch || !IsValid(surface, chart)) return std::nullopt;
+  Stretch stretch = MeasureStretch(surface, chart);
+  if (stretch.flipped && !MapConformally(surface, chart)) return std::nullopt;
+  if (stretch.l2 > kExactStretch) {
+    MakeRigid(surface, chart);
+    stretch = MeasureStretch(surface, chart);
+  }
+  if (stretch.flipped || stretch.l2 > options.maxStretch || !IsInjective(chart, BoundaryEdges(surface, chart))) return std::nullopt;
   NormalizeArea(surface, chart);
   return chart;
 }

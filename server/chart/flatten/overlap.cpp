@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace bakewell::chart {
@@ -10,6 +12,9 @@ namespace {
 
 // Cross products below this share of the lengths involved are rounding: the points touch.
 constexpr double kTouchShare = 1e-11;
+
+// How far a border vertex is drawn in, as a share of the least altitude of its faces.
+constexpr double kDrawIn = 1e-3;
 
 struct Box {
   Vec2d low, high;
@@ -38,11 +43,11 @@ bool Cross(std::span<const Vec2d> uv, const std::array<uint32_t, 2>& e, const st
 // Horizontal bands of the bounding box; every band lists the edges that reach into it, by their left end.
 class Bands {
  public:
-  Bands(std::span<const Vec2d> uv, std::span<const std::array<uint32_t, 2>> edge) : uv_(uv), edge_(edge) {
-    low_ = edge.empty() ? 0 : uv[edge[0][0]].y;
+  Bands(std::vector<Vec2d> points, std::span<const std::array<uint32_t, 2>> edge) : uv_(std::move(points)), edge_(edge) {
+    low_ = edge.empty() ? 0 : uv_[edge[0][0]].y;
     double high = low_, length = 0;
     for (const auto& e : edge) {
-      const Box box = BoundsOf(uv, e);
+      const Box box = BoundsOf(uv_, e);
       low_ = std::min(low_, box.low.y);
       high = std::max(high, box.high.y);
       length += box.high.y - box.low.y;
@@ -95,7 +100,7 @@ class Bands {
     return false;
   }
 
-  std::span<const Vec2d> uv_;
+  std::vector<Vec2d> uv_;
   std::span<const std::array<uint32_t, 2>> edge_;
   double low_ = 0, height_ = 0;
   int count_ = 1;
@@ -103,10 +108,83 @@ class Bands {
   std::vector<uint32_t> member_;
 };
 
+// The angle that a vertex' faces take in the plane, per vertex.
+std::vector<double> AngleSums(const FlatChart& chart) {
+  std::vector<double> sum(chart.vertex.size(), 0);
+  for (const auto& corner : chart.corner)
+    for (int k = 0; k < 3; ++k) {
+      const Vec2d p = chart.uv[corner[k]];
+      const Vec2d u = chart.uv[corner[(k + 1) % 3]] - p, v = chart.uv[corner[(k + 2) % 3]] - p;
+      sum[corner[k]] += std::atan2(u.x * v.y - u.y * v.x, u.x * v.x + u.y * v.y);
+    }
+  return sum;
+}
+
+// Full turns of each border loop, rounded; every vertex has at most one border edge that leaves it.
+std::vector<int> LoopTurns(std::span<const std::array<uint32_t, 2>> boundary, const std::vector<double>& angle) {
+  std::vector<uint32_t> next(angle.size(), kNone);
+  for (const auto& [a, b] : boundary) next[a] = b;
+  std::vector<int> turns;
+  for (const auto& [first, unused] : boundary) {
+    double turn = 0;
+    uint32_t v = first;
+    while (next[v] != kNone) {
+      turn += kPi - angle[v];
+      v = std::exchange(next[v], kNone);
+    }
+    if (turn != 0) turns.push_back(static_cast<int>(std::lround(turn / (2 * kPi))));
+  }
+  return turns;
+}
+
+// Inner vertices have faces all round, border vertices not more than all round.
+bool NoVertexCoveredTwice(std::span<const std::array<uint32_t, 2>> boundary, const std::vector<double>& angle) {
+  std::vector<bool> inner(angle.size(), true);
+  for (const auto& edge : boundary) inner[edge[0]] = false;
+  for (size_t v = 0; v < angle.size(); ++v) {
+    const double turns = angle[v] / (2 * kPi);
+    if (inner[v] ? std::lround(turns) != 1 : turns > 1 + kTouchShare) return false;
+  }
+  return true;
+}
+
+// The least altitude of the faces around each vertex.
+std::vector<double> LeastAltitudes(const FlatChart& chart) {
+  std::vector<double> least(chart.vertex.size(), std::numeric_limits<double>::infinity());
+  for (size_t i = 0; i < chart.face.size(); ++i) {
+    double longest = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Vec2d e = chart.uv[chart.corner[i][(k + 1) % 3]] - chart.uv[chart.corner[i][k]];
+      longest = std::max(longest, std::hypot(e.x, e.y));
+    }
+    for (const uint32_t v : chart.corner[i]) least[v] = std::min(least[v], SignedArea2(chart, i) / longest);
+  }
+  return least;
+}
+
+// The border drawn in by a little: sides of a slit, which touch, part; sheets that lie exactly on one another cross.
+std::vector<Vec2d> DrawnIn(const FlatChart& chart, std::span<const std::array<uint32_t, 2>> boundary,
+                           const std::vector<double>& angle) {
+  const std::vector<double> altitude = LeastAltitudes(chart);
+  std::vector<Vec2d> uv = chart.uv;
+  for (const auto& [a, b] : boundary) {
+    const Vec2d d = chart.uv[b] - chart.uv[a];
+    const double half = angle[a] / 2, c = std::cos(half), s = std::sin(half);
+    const double step = kDrawIn * altitude[a] / std::hypot(d.x, d.y);
+    uv[a] = chart.uv[a] + Vec2d{c * d.x - s * d.y, s * d.x + c * d.y} * step;
+  }
+  return uv;
+}
+
 }  // namespace
 
-bool OutlineCrossesItself(std::span<const Vec2d> uv, std::span<const std::array<uint32_t, 2>> edge) {
-  return Bands(uv, edge).AnyCrossing();
+bool IsInjective(const FlatChart& chart, std::span<const std::array<uint32_t, 2>> boundary) {
+  const std::vector<double> angle = AngleSums(chart);
+  if (!NoVertexCoveredTwice(boundary, angle)) return false;
+  const std::vector<int> turns = LoopTurns(boundary, angle);
+  if (std::count(turns.begin(), turns.end(), 1) != 1) return false;
+  if (std::count(turns.begin(), turns.end(), -1) + 1 != static_cast<std::ptrdiff_t>(turns.size())) return false;
+  return !Bands(DrawnIn(chart, boundary, angle), boundary).AnyCrossing();
 }
 
 }  // namespace bakewell::chart

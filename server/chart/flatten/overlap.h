@@ -4,14 +4,13 @@
 #include <cstdint>
 #include <span>
 
-#include "core/math/vec.h"
+#include "server/chart/flatten/flat_chart.h"
 
 namespace bakewell::chart {
 
-// Whether a border crosses itself: segments between uv[edge[0]] and uv[edge[1]] that meet in a point inside both.
-// Segments that only touch do not cross. For a connected chart whose faces all have positive area in the plane, an
-// outline that does not cross itself and has exactly one outer loop means that no two faces overlap.
-// Expected O(m log m) for m edges of similar length.
-bool OutlineCrossesItself(std::span<const Vec2d> uv, std::span<const std::array<uint32_t, 2>> edge);
+// Whether a chart whose faces all have positive area in the plane covers no point of it twice: its inner vertices are
+// surrounded once, its border consists of one outer loop and holes (by their turning), and no two border edges cross (edges
+// that only touch do not). `boundary`: BoundaryEdges of the chart. Expected O(m log m + n) for m border edges of similar length.
+bool IsInjective(const FlatChart& chart, std::span<const std::array<uint32_t, 2>> boundary);
 
 }  // namespace bakewell::chart
