@@ -36,7 +36,7 @@ struct Prepared {
 Prepared Prepare(const MeshCharts& mesh, uint32_t c, bool to_axis) {
   const FlatChart& chart = mesh.charts[c];
   Prepared prepared;
-  for (const auto& [a, b] : BoundaryEdges(mesh.surface, chart))
+  for (const auto& [a, b, unused] : BoundaryEdges(mesh.surface, chart))
     prepared.item.outline.push_back({chart.uv[a], chart.uv[b]});
   Upright& upright = prepared.upright;
   upright.units = 1 / mesh.surface.scale;

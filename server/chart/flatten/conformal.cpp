@@ -11,19 +11,19 @@ using Matrix = Eigen::SparseMatrix<double>;
 
 // The boundary vertex farthest from a vertex in space.
 uint32_t FarthestFrom(const Surface& surface, const FlatChart& chart,
-                      const std::vector<std::array<uint32_t, 2>>& boundary, uint32_t from) {
+                      const std::vector<BoundaryEdge>& boundary, uint32_t from) {
   uint32_t best = from;
   double farthest = 0;
   for (const auto& edge : boundary) {
-    const Vec3d d = surface.position[chart.vertex[edge[0]]] - surface.position[chart.vertex[from]];
-    if (Dot(d, d) > farthest) farthest = Dot(d, d), best = edge[0];
+    const Vec3d d = surface.position[chart.vertex[edge.a]] - surface.position[chart.vertex[from]];
+    if (Dot(d, d) > farthest) farthest = Dot(d, d), best = edge.a;
   }
   return best;
 }
 
 // u of vertex v is unknown 2 v, v of it 2 v + 1. Area of the outline: half the sum over boundary edges of u x v.
 Entries ConformalEnergy(const Surface& surface, const FlatChart& chart,
-                        const std::vector<std::array<uint32_t, 2>>& boundary) {
+                        const std::vector<BoundaryEdge>& boundary) {
   Entries entries;
   const std::vector<PlanarFace> faces = PlanarFaces(surface, chart);
   for (size_t i = 0; i < faces.size(); ++i)
@@ -33,7 +33,7 @@ Entries ConformalEnergy(const Surface& surface, const FlatChart& chart,
     }
   // |d|^2 / 2 - area, doubled: the entry of u_a v_b is -1/2, that of v_a u_b +1/2.
   for (const auto& edge : boundary) {
-    const int a = static_cast<int>(edge[0]), b = static_cast<int>(edge[1]);
+    const int a = static_cast<int>(edge.a), b = static_cast<int>(edge.b);
     entries.emplace_back(std::max(2 * a, 2 * b + 1), std::min(2 * a, 2 * b + 1), -0.5);
     entries.emplace_back(std::max(2 * a + 1, 2 * b), std::min(2 * a + 1, 2 * b), 0.5);
   }
@@ -66,7 +66,7 @@ Reduced Reduce(const Entries& entries, const std::vector<int>& number, const Eig
 bool MapConformally(const Surface& surface, FlatChart& chart) {
   const auto boundary = BoundaryEdges(surface, chart);
   if (boundary.empty()) return false;
-  const uint32_t a = FarthestFrom(surface, chart, boundary, boundary[0][0]), b = FarthestFrom(surface, chart, boundary, a);
+  const uint32_t a = FarthestFrom(surface, chart, boundary, boundary[0].a), b = FarthestFrom(surface, chart, boundary, a);
   if (a == b) return false;
 
   // a lies at the origin, b on the u axis.

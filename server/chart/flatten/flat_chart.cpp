@@ -8,6 +8,9 @@ namespace bakewell::chart {
 
 namespace {
 
+// A face thinner than this share of its longest edge squared flips by rounding alone.
+constexpr double kFlatShare = 1e-14;
+
 // Faces of a chart by place in a sorted list: a chart is small beside its surface.
 class Members {
  public:
@@ -72,16 +75,41 @@ FlatChart LocalChart(const Surface& surface, std::span<const uint32_t> faces) {
   return chart;
 }
 
-std::vector<std::array<uint32_t, 2>> BoundaryEdges(const Surface& surface, const FlatChart& chart) {
+std::vector<BoundaryEdge> BoundaryEdges(const Surface& surface, const FlatChart& chart) {
   const Members members(chart.face);
-  std::vector<std::array<uint32_t, 2>> edges;
-  for (size_t i = 0; i < chart.face.size(); ++i)
+  std::vector<BoundaryEdge> edges;
+  for (uint32_t i = 0; i < chart.face.size(); ++i)
     for (int k = 0; k < 3; ++k) {
       const uint32_t other = surface.across[chart.face[i]][k];
       if (other == kNone || members.IndexOf(other) == kNone)
-        edges.push_back({chart.corner[i][k], chart.corner[i][(k + 1) % 3]});
+        edges.push_back({chart.corner[i][k], chart.corner[i][(k + 1) % 3], i});
     }
   return edges;
+}
+
+std::vector<std::vector<uint32_t>> ConnectedParts(const Surface& surface, std::span<const uint32_t> faces) {
+  const Members members(faces);
+  std::vector<uint32_t> parent(faces.size()), number(faces.size(), kNone);
+  std::iota(parent.begin(), parent.end(), 0u);
+  for (uint32_t i = 0; i < faces.size(); ++i)
+    for (const uint32_t other : surface.across[faces[i]])
+      if (const uint32_t j = other == kNone ? kNone : members.IndexOf(other); j != kNone) Join(parent, i, j);
+  std::vector<std::vector<uint32_t>> parts;
+  for (uint32_t i = 0; i < faces.size(); ++i) {
+    uint32_t& part = number[Find(parent, i)];
+    if (part == kNone) {
+      part = static_cast<uint32_t>(parts.size());
+      parts.emplace_back();
+    }
+    parts[part].push_back(faces[i]);
+  }
+  return parts;
+}
+
+bool IsFlipped(const FlatChart& chart, size_t face) {
+  const auto& [a, b, c] = chart.corner[face];
+  const Vec2d u = chart.uv[b] - chart.uv[a], v = chart.uv[c] - chart.uv[a];
+  return !(Cross(u, v) > kFlatShare * (u.x * u.x + u.y * u.y + v.x * v.x + v.y * v.y));
 }
 
 double SignedArea2(const FlatChart& chart, size_t face) {

@@ -12,7 +12,7 @@ constexpr int kStepsPerCost = 512;
 constexpr int kMaxLevels = 8192;
 // Mean deviation 1 - |sum of area normals| / area at which the normal term counts 1: that of a spherical cap of 60
 // degrees, which still flattens to a Sander stretch of about 1.005.
-constexpr double kUnitDeviation = 0.25;
+constexpr double kUnitDeviation = 0.33;
 constexpr float kAlwaysSeam = 1000;
 
 // The weighted cost of merging the two regions of a link; terms are ratios.
@@ -37,7 +37,7 @@ class Cost {
     const double ragged = std::max(0.0, 0.25 - shared);
     return options_.normalDeviationWeight * deviation + options_.roundnessWeight * roundness +
            options_.straightnessWeight * 0.1 * ragged * std::min(1.0, deviation) +
-           options_.normalSeamWeight * link.crease / link.length +
+           options_.normalSeamWeight * 0.6 * link.crease / link.length +
            options_.textureSeamWeight * link.texture_seam / link.length;
   }
 
