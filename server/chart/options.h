@@ -14,10 +14,10 @@ struct ChartOptions {
   float normalSeamWeight = 4;          // cost of growing over a sharp edge; above 1000 sharp edges always are seams
   float textureSeamWeight = 0.5f;      // cost of growing over a seam of the input UVs
   float maxCost = 2;                   // charts stop growing where the weighted sum exceeds this
-  uint32_t maxIterations = 1;          // passes that straighten borders after growing
+  uint32_t maxIterations = 2;          // passes that round charts and straighten their borders after growing
   bool useInputMeshUvs = false;        // keep the input's UV charts (rescaled to one density), generate where invalid
   bool fixWinding = false;             // turn faces so that neighbours agree before charting
-  float maxStretch = 1.25f;            // ours: bound of a chart's Sander L2 stretch; a chart above it is split
+  float maxStretch = 1.004f;           // ours: bound of a chart's Sander L2 stretch; a chart above it is split
 };
 
 // How charts are laid out on pages. The names, and what 0 means, are xatlas'.

@@ -12,9 +12,9 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 using Points = Eigen::MatrixX2d;
 
-constexpr int kMaxSteps = 24;
+constexpr int kMaxSteps = 32;
 // A step that takes less than this share of what is left above isometry is the last.
-constexpr double kLeastGain = 0.01;
+constexpr double kLeastGain = 0.005;
 // A step goes at most this share of the way to the first face that would collapse.
 constexpr double kSafeShare = 0.9;
 

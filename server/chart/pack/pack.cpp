@@ -26,7 +26,7 @@ struct Effort {
   int finalists;  // of them, those that get a density search
   int tilts;
 };
-constexpr Effort kNormalEffort{6, 48, 1, 2}, kBruteEffort{16, 256, 6, 4};
+constexpr Effort kNormalEffort{6, 108, 2, 2}, kBruteEffort{16, 432, 6, 4};
 
 struct Plan {
   Order order;
@@ -37,7 +37,11 @@ struct Outcome {
   Trial trial;
   Grid grid{0, 0, 1};
   Raster raster;
-  double Score() const { return raster.texels_per_unit; }
+  // Density for the page area used; a page of a given shape counts whole.
+  double Score(bool free_shape) const {
+    const double area = double(grid.width) * (free_shape ? trial.used_height : grid.height);
+    return raster.texels_per_unit / std::sqrt(area);
+  }
 };
 
 std::vector<Candidate> MakeCandidates(std::span<const PackItem> items, const Raster& raster) {
@@ -60,9 +64,10 @@ std::vector<Plan> MakePlans(int count, bool free_shape) {
   for (int i = 0; i < count; ++i) {
     Plan plan;
     plan.order.long_weight = i % 3 == 0 ? 0.25 : i % 3 == 1 ? 1.0 : 0.0;
-    plan.order.jitter = i < 6 ? 0 : 0.35;
+    plan.order.height_weight = i / 3 % 2 == 0 ? 1.0 : 0.5;
+    plan.order.jitter = i < 54 ? 0 : 0.35;
     plan.order.seed = static_cast<uint32_t>(i);
-    if (free_shape) plan.aspect = std::exp2((i / 3 % 9 - 4) * 0.11);
+    if (free_shape) plan.aspect = std::exp2((i / 6 % 9 - 4) * 0.11);
     plans.push_back(plan);
   }
   return plans;
@@ -126,7 +131,7 @@ std::optional<Outcome> SearchPlans(std::span<const PackItem> items, Raster raste
   std::optional<Outcome> best;
   for (const Plan& plan : plans) {
     auto outcome = SearchDensity(items, raster, GridOf(texels, plan.aspect, raster.cell), plan, effort.trials);
-    if (outcome && (!best || outcome->Score() > best->Score())) best = std::move(outcome);
+    if (outcome && (!best || outcome->Score(free_shape) > best->Score(free_shape))) best = std::move(outcome);
   }
   return best;
 }
@@ -188,10 +193,12 @@ PackResult Pack(std::span<const PackItem> items, const PackOptions& options) {
 
   const double texels = double(side) * side;
   Raster raster = RasterFor(options, side);
-  auto best = SearchPlans(items, raster, texels, free_side, options.bruteForce ? kBruteEffort : kNormalEffort);
+  std::optional<Outcome> best;
+  const double least = Demand({}, 0, raster.gutter) * double(items.size());
+  if (least < texels)
+    best = SearchPlans(items, raster, texels, free_side, options.bruteForce ? kBruteEffort : kNormalEffort);
   if (!best) {
     // More charts than a page has room for, however small: as many pages as they need.
-    const double least = Demand({}, 0, raster.gutter) * double(items.size());
     raster.texels_per_unit = EstimateDensity(items, raster.gutter, 2 * std::max(texels, least));
     return PackPages(items, raster, side);
   }

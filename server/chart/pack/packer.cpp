@@ -56,6 +56,7 @@ class Packer {
 
   Trial Run(const Order& order) && {
     trial_.placement.resize(candidates_.size());
+    height_weight_ = order.height_weight;
     for (const uint32_t i : PlacingOrder(candidates_, order)) {
       if (Place(i)) continue;
       trial_.complete = false;
@@ -84,17 +85,18 @@ class Packer {
     return false;
   }
 
-  // The pose that reaches least far down.
   Choice Choose(const Candidate& candidate, int page) {
     Choice best;
-    int limit = grid_.height;
+    double least = INFINITY;
     for (const Pose& pose : candidate.poses) {
-      const int from = start_.Of(pose.shape, page);
+      const int height = pose.shape.height, from = start_.Of(pose.shape, page);
+      const double last_row = std::ceil(least - height_weight_ * height) - 1;
+      const int limit = static_cast<int>(std::clamp(last_row + height, 0.0, double(grid_.height)));
       const auto spot = pages_[page].FindLowest(pose.shape, from, limit);
-      start_.Set(pose.shape, page, spot ? spot->y : std::max(from, limit - pose.shape.height));
+      start_.Set(pose.shape, page, spot ? spot->y : std::max(from, limit - height));
       if (!spot) continue;
       best = {&pose, *spot};
-      limit = spot->y + pose.shape.height - 1;
+      least = spot->y + height_weight_ * height;
     }
     return best;
   }
@@ -115,6 +117,7 @@ class Packer {
   std::span<const Candidate> candidates_;
   std::vector<Page> pages_;
   SearchStart start_;
+  double height_weight_ = 1;
   Trial trial_;
 };
 

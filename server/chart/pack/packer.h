@@ -15,8 +15,9 @@ struct Grid {
 
 // In which order charts are placed: by cells + long_weight * (longest side)^2, each multiplied by a keyed random factor
 // within 1 +- jitter; the largest first, ties by number.
+// Of a chart's poses the one is taken whose y + height_weight * height is least.
 struct Order {
-  double long_weight = 0.25, jitter = 0;
+  double long_weight = 0.25, jitter = 0, height_weight = 1;
   uint32_t seed = 0;
 };
 
@@ -28,8 +29,7 @@ struct Trial {
   std::vector<int64_t> cells;           // taken, one per page
 };
 
-// Places charts one by one, each in the pose and the lowest free spot that reach least far down a page; the next page
-// is begun when none has room. Pure.
+// Places charts one by one, each at its pose's lowest free spot; the next page is begun when none has room. Pure.
 Trial PlaceAll(const Grid& grid, std::span<const Candidate> candidates, const Order& order);
 
 }  // namespace bakewell::chart

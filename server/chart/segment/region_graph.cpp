@@ -95,6 +95,7 @@ std::vector<uint32_t> RegionGraph::Merge(uint32_t link) {
   if (links_of_[large].size() < links_of_[small].size()) std::swap(large, small);
   regions_[large].area_normal += regions_[small].area_normal;
   regions_[large].area += regions_[small].area;
+  regions_[large].faces += regions_[small].faces;
   regions_[large].outline = std::max(0.0, regions_[large].outline + regions_[small].outline - 2 * links_[link].length);
   parent_[small] = large;
   links_[link].alive = false;

@@ -13,6 +13,7 @@ struct Region {
   Vec3d area_normal{0, 0, 0};  // sum of area * normal
   double area = 0;
   double outline = 0;  // length of its border
+  uint32_t faces = 1;
 };
 
 // The border that two regions share.

@@ -57,18 +57,36 @@ def boxes(count, seed):
     return soup.v, soup.f
 
 
-def rooms(side, props, seed):
-    """side x side rooms with props boxes each: a level of walls and furniture."""
+def tessellated_box(low, high, n, outward=True):
+    """A box whose faces are n x n quads with vertices of their own."""
+    soup = Soup()
+    for axis in range(3):
+        for end in (0, 1):
+            a, b = (axis + 1) % 3, (axis + 2) % 3
+            if (end == 0) == outward:
+                a, b = b, a
+            def point(u, v):
+                p = [0.0, 0.0, 0.0]
+                p[axis] = (low, high)[end][axis]
+                p[a] = low[a] + u * (high[a] - low[a])
+                p[b] = low[b] + v * (high[b] - low[b])
+                return tuple(p)
+            soup.add(grid(n, n, point, False, False))
+    return soup.v, soup.f
+
+
+def rooms(side, props, seed, n=1):
+    """side x side rooms with props boxes each: a level of walls and furniture, each wall n x n quads."""
     rng, soup = random.Random(seed), Soup()
     for i in range(side):
         for j in range(side):
             w, d, h = rng.uniform(3, 6), rng.uniform(3, 6), rng.uniform(2.5, 4)
             x, z = 7 * i, 7 * j
-            soup.add(box((x, 0, z), (x + w, h, z + d), outward=False))
+            soup.add(tessellated_box((x, 0, z), (x + w, h, z + d), n, outward=False))
             for _ in range(props):
                 s = [rng.uniform(0.1, 1.2) for _ in range(3)]
                 p = (x + rng.uniform(0, w - s[0]), rng.uniform(0, h - s[1]), z + rng.uniform(0, d - s[2]))
-                soup.add(box(p, tuple(p[k] + s[k] for k in range(3))))
+                soup.add(tessellated_box(p, tuple(p[k] + s[k] for k in range(3)), n))
     return soup.v, soup.f
 
 
@@ -213,8 +231,8 @@ PROCEDURAL = {
     "broken": lambda: broken(3),
 }
 LARGE = {
-    "rooms_100k": lambda: rooms(21, 18, 2),
-    "rooms_1m": lambda: rooms(66, 18, 2),
+    "rooms_100k": lambda: rooms(9, 18, 2, 3),
+    "rooms_1m": lambda: rooms(14, 18, 2, 5),
     "terrain_100k": lambda: terrain_level(3, 74, 4),
     "terrain_1m": lambda: terrain_level(10, 71, 4),
     "organic_80k": lambda: sphere(284, 142, lumps),
