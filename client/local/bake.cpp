@@ -20,12 +20,13 @@ namespace {
 constexpr double kMostBadSamples = 1e-6;  // share of NaN or infinite samples above which a bake fails
 
 tbb::global_control Threads(int threads) {
-  const unsigned int count = threads > 0 ? static_cast<unsigned int>(threads) : std::max(1U, std::thread::hardware_concurrency());
+  const unsigned int count =
+      threads > 0 ? static_cast<unsigned int>(threads) : std::max(1U, std::thread::hardware_concurrency());
   return {tbb::global_control::max_allowed_parallelism, count};
 }
 
-absl::StatusOr<PreparedLevel> LoadAndPrepare(const std::filesystem::path& path, const BakeSettings& settings, PhaseClock& clock,
-                                             Progress& progress) {
+absl::StatusOr<PreparedLevel> LoadAndPrepare(const std::filesystem::path& path, const BakeSettings& settings,
+                                             PhaseClock& clock, Progress& progress) {
   clock.Begin("load");
   BAKEWELL_ASSIGN_OR_RETURN(LoadedLevel level, LoadLevel(path));
   clock.End();
@@ -38,7 +39,8 @@ double EstimatedError(std::span<const TexelLight> lights) {
   double variance = 0, sum = 0, count = 0;
   for (const TexelLight& light : lights) {
     if (!light.valid) continue;
-    const double spread = 0.2126 * std::sqrt(static_cast<double>(light.variance.x)) + 0.7152 * std::sqrt(static_cast<double>(light.variance.y)) +
+    const double spread = 0.2126 * std::sqrt(static_cast<double>(light.variance.x)) +
+                          0.7152 * std::sqrt(static_cast<double>(light.variance.y)) +
                           0.0722 * std::sqrt(static_cast<double>(light.variance.z));
     variance += spread * spread;
     sum += static_cast<double>(Luminance(light.irradiance));
@@ -98,11 +100,13 @@ absl::Status WriteScene(const BakeRequest& request, const PreparedLevel& prepare
     pages.push_back({name + ".irradiance.exr", name + ".sh.exr", name + ".variance.exr"});
   }
 
-  BAKEWELL_RETURN_IF_ERROR(WriteLevel(request.scene_path, *prepared.level, prepared.layout, pages, folder / "scene.glb"));
+  BAKEWELL_RETURN_IF_ERROR(
+      WriteLevel(request.scene_path, *prepared.level, prepared.layout, pages, folder / "scene.glb"));
   return PageWriter(folder, files).List("scene.glb", "scene");
 }
 
-Manifest MakeManifest(const std::filesystem::path& scene_path, const BakeSettings& settings, const PreparedLevel& prepared) {
+Manifest MakeManifest(const std::filesystem::path& scene_path, const BakeSettings& settings,
+                      const PreparedLevel& prepared) {
   Manifest manifest;
   manifest.scene_file = scene_path.filename().string();
   manifest.scene_digest = SceneDigest(prepared.level->scene);
@@ -156,8 +160,9 @@ absl::StatusOr<BakeSummary> Conclude(OutputDir& out, const std::filesystem::path
 absl::Status CheckSamples(const GatherCounters& counters) {
   const double samples = static_cast<double>(counters.gather_rays + counters.shadow_rays);
   if (static_cast<double>(counters.bad_samples) <= kMostBadSamples * samples) return absl::OkStatus();
-  return absl::InternalError(std::to_string(counters.bad_samples) + " of " + std::to_string(static_cast<int64_t>(samples)) +
-                             " samples were NaN or infinite; lights or emission of this scene are beyond what float can hold");
+  return absl::InternalError(
+      std::to_string(counters.bad_samples) + " of " + std::to_string(static_cast<int64_t>(samples)) +
+      " samples were NaN or infinite; lights or emission of this scene are beyond what float can hold");
 }
 
 }  // namespace
@@ -166,7 +171,8 @@ absl::StatusOr<BakeSummary> Bake(const BakeRequest& request, Progress& progress)
   const double wall = PhaseClock::WallSeconds(), cpu = PhaseClock::CpuSeconds();
   const tbb::global_control threads = Threads(request.threads);
   PhaseClock clock;
-  BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared, LoadAndPrepare(request.scene_path, request.settings, clock, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared,
+                            LoadAndPrepare(request.scene_path, request.settings, clock, progress));
   BAKEWELL_ASSIGN_OR_RETURN(const BakedTexels baked, BakeTexels(prepared, request.settings, clock, progress));
   BAKEWELL_RETURN_IF_ERROR(CheckSamples(baked.counters));
   BAKEWELL_ASSIGN_OR_RETURN(OutputDir out, OutputDir::Create(request.output_dir));
@@ -191,8 +197,8 @@ struct ReferencePages {
 ReferencePages PutReference(const TexelMap& map, std::span<const ReferenceTexel> texels, int page) {
   const PageSize size = map.pages[page];
   const std::vector<std::string> rgba{"R", "G", "B", "A"};
-  ReferencePages pages{Image(size.width, size.height, rgba), Image(size.width, size.height, rgba), Image(size.width, size.height, rgba),
-                       Image(size.width, size.height, {"Y"})};
+  ReferencePages pages{Image(size.width, size.height, rgba), Image(size.width, size.height, rgba),
+                       Image(size.width, size.height, rgba), Image(size.width, size.height, {"Y"})};
   for (size_t i = 0; i < texels.size(); ++i) {
     const Texel& texel = map.texels[i];
     if (texel.page != page) continue;
@@ -223,11 +229,13 @@ absl::StatusOr<BakeSummary> BakeReference(const ReferenceRequest& request, Progr
   const double wall = PhaseClock::WallSeconds(), cpu = PhaseClock::CpuSeconds();
   const tbb::global_control threads = Threads(request.threads);
   PhaseClock clock;
-  BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared, LoadAndPrepare(request.scene_path, request.settings, clock, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared,
+                            LoadAndPrepare(request.scene_path, request.settings, clock, progress));
   Manifest manifest = MakeManifest(request.scene_path, request.settings, prepared);
   clock.Begin("reference");
-  const std::vector<ReferenceTexel> texels = TraceReference(*prepared.world, *prepared.lights, prepared.layout, prepared.texels,
-                                                            request.spp, request.settings.seed, progress, manifest.rays);
+  const std::vector<ReferenceTexel> texels =
+      TraceReference(*prepared.world, *prepared.lights, prepared.layout, prepared.texels, request.spp,
+                     request.settings.seed, progress, manifest.rays);
   clock.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
   manifest.estimated_error = ReferenceError(texels);

@@ -35,7 +35,8 @@ struct PreparedLevel {
   std::vector<std::string> warnings;
 };
 
-absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings& settings, PhaseClock& clock, Progress& progress);
+absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings& settings, PhaseClock& clock,
+                                           Progress& progress);
 
 // Samples, photons and target of a quality, with the settings' own numbers in their place.
 struct Budget {

@@ -44,7 +44,8 @@ int PageSideForDensity(const Scene& scene, float texels_per_metre) {
     if (!object.lightmapped) continue;
     for (size_t i = 0; i + 2 < object.index.size(); i += 3) {
       const uint32_t a = object.index[i], b = object.index[i + 1], c = object.index[i + 2];
-      world_area += Length(Cross(ToDouble(object.position[b] - object.position[a]), ToDouble(object.position[c] - object.position[a])));
+      world_area += Length(
+          Cross(ToDouble(object.position[b] - object.position[a]), ToDouble(object.position[c] - object.position[a])));
       uv_area += std::fabs(static_cast<double>(Cross(object.uv1[b] - object.uv1[a], object.uv1[c] - object.uv1[a])));
     }
   }
@@ -54,7 +55,8 @@ int PageSideForDensity(const Scene& scene, float texels_per_metre) {
 
 PageSize KeptPage(const Scene& scene, const BakeSettings& settings) {
   if (settings.resolution > 0) return {settings.resolution, settings.resolution};
-  if (settings.texels_per_metre <= 0 && scene.lightmap_page) return {scene.lightmap_page->width, scene.lightmap_page->height};
+  if (settings.texels_per_metre <= 0 && scene.lightmap_page)
+    return {scene.lightmap_page->width, scene.lightmap_page->height};
   const float density = settings.texels_per_metre > 0 ? settings.texels_per_metre : kDefaultTexelsPerMetre;
   const int side = PageSideForDensity(scene, density);
   return {side, side};
@@ -72,15 +74,17 @@ absl::StatusOr<AtlasLayout> MakeCharts(const Scene& scene, const BakeSettings& s
 
 void WarnAboutTexels(const TexelMap& texels, std::vector<std::string>& warnings) {
   if (texels.overlapping_texels > 0) {
-    warnings.push_back(std::to_string(texels.overlapping_texels) +
-                       " texels are covered by more than one chart: their TEXCOORD_1 overlaps or lies closer than a texel; "
-                       "use --uv generate");
+    warnings.push_back(
+        std::to_string(texels.overlapping_texels) +
+        " texels are covered by more than one chart: their TEXCOORD_1 overlaps or lies closer than a texel; "
+        "use --uv generate");
   }
 }
 
 }  // namespace
 
-absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings& settings, PhaseClock& clock, Progress& progress) {
+absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings& settings, PhaseClock& clock,
+                                           Progress& progress) {
   PreparedLevel prepared;
   prepared.level = std::make_unique<LoadedLevel>(std::move(level));
   prepared.warnings = prepared.level->warnings;
@@ -101,7 +105,8 @@ absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings
   clock.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
   if (prepared.texels.texels.empty()) {
-    return absl::InvalidArgumentError("no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");
+    return absl::InvalidArgumentError(
+        "no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");
   }
   return prepared;
 }

@@ -49,7 +49,10 @@ void Add(const GatherCounters& from, GatherCounters& to) {
 }
 
 // Cells grow in number more slowly than photons, so that both the blur and the noise of the cache go to zero.
-int64_t CellsFor(int64_t photons) { return std::max<int64_t>(1024, static_cast<int64_t>(4 * std::cbrt(static_cast<double>(photons)) * std::cbrt(static_cast<double>(photons)))); }
+int64_t CellsFor(int64_t photons) {
+  return std::max<int64_t>(1024, static_cast<int64_t>(4 * std::cbrt(static_cast<double>(photons)) *
+                                                      std::cbrt(static_cast<double>(photons))));
+}
 
 struct Photons {
   SurfaceCells cells;
@@ -62,8 +65,9 @@ absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSe
   const LightSet& lights = *prepared.lights;
   Photons result;
   clock.Begin("photons");
-  const EmissionGuide guide = EmissionGuide::Learn(world, lights, prepared.layout, prepared.texels,
-                                                   static_cast<int>(std::min<int64_t>(count / 16, 100000)), settings.seed);
+  const EmissionGuide guide =
+      EmissionGuide::Learn(world, lights, prepared.layout, prepared.texels,
+                           static_cast<int>(std::min<int64_t>(count / 16, 100000)), settings.seed);
   const PhotonPlan plan = PlanPhotons(lights, guide, count, settings.seed);
   result.cells = SurfaceCells::Build(world, CellsFor(count));
   PhotonMap map;
@@ -72,8 +76,8 @@ absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSe
   std::atomic<int> done{0};
   tbb::parallel_for(0, batches, [&](int batch) {
     const FlushDenormals mode;
-    EmitPhotons(world, lights, guide, result.cells, plan, plan.photons * batch / batches, plan.photons * (batch + 1) / batches,
-                progress, map);
+    EmitPhotons(world, lights, guide, result.cells, plan, plan.photons * batch / batches,
+                plan.photons * (batch + 1) / batches, progress, map);
     progress.Report("photons", ++done, batches);
   });
   clock.End();
@@ -99,7 +103,8 @@ Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
   budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
   budget.gather.seed = settings.seed;
   const int64_t texel_count = static_cast<int64_t>(texels.texels.size());
-  budget.photons = settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texel_count * numbers.photons_per_texel);
+  budget.photons =
+      settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texel_count * numbers.photons_per_texel);
   return budget;
 }
 
@@ -107,7 +112,8 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
                                        Progress& progress) {
   BakedTexels baked;
   Budget budget = BudgetOf(settings, prepared.texels);
-  BAKEWELL_ASSIGN_OR_RETURN(const Photons photons, TracePhotons(prepared, settings, budget.photons, baked, clock, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(const Photons photons,
+                            TracePhotons(prepared, settings, budget.photons, baked, clock, progress));
   clock.Begin("gather");
   const LightSelector selector(*prepared.lights);
   const GatherScene scene{*prepared.world, *prepared.lights, selector, photons.cells, photons.cache};
@@ -120,7 +126,8 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
     if (progress.Cancelled()) return;
     const FlushDenormals mode;
     GatherCounters counters;
-    const std::vector<TexelLight> lights = GatherTile(scene, prepared.layout, prepared.texels, tile, budget.gather, counters);
+    const std::vector<TexelLight> lights =
+        GatherTile(scene, prepared.layout, prepared.texels, tile, budget.gather, counters);
     std::copy(lights.begin(), lights.end(), baked.lights.begin() + prepared.texels.tile_begin[tile]);
     progress.Report("gather", ++done, tiles);
     const std::lock_guard<std::mutex> lock(mutex);

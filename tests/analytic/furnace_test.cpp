@@ -11,7 +11,8 @@ namespace {
 Scene Furnace(float albedo) {
   SceneBuilder builder({48, 32});
   const int wall = builder.AddMaterial({albedo, albedo, albedo}, {1, 1, 1});
-  builder.AddRoom({0, 0, 0}, {3, 2, 4}, {.material = wall, .lightmapped = true, .page = {0, 0, 48, 32}, .name = "room"});
+  builder.AddRoom({0, 0, 0}, {3, 2, 4},
+                  {.material = wall, .lightmapped = true, .page = {0, 0, 48, 32}, .name = "room"});
   return builder.Build();
 }
 
@@ -39,7 +40,8 @@ TEST(Furnace, NineTenthsAlbedo) { ExpectFurnace(0.9f, 1000000, 2e-3, 2e-2); }
 
 TEST(PhotonMap, FluxIsConserved) {
   const PreparedLevel prepared = PrepareInMemory(Furnace(0.7f), {});
-  const EmissionGuide guide = EmissionGuide::Learn(*prepared.world, *prepared.lights, prepared.layout, prepared.texels, 100, 0);
+  const EmissionGuide guide =
+      EmissionGuide::Learn(*prepared.world, *prepared.lights, prepared.layout, prepared.texels, 100, 0);
   const PhotonPlan plan = PlanPhotons(*prepared.lights, guide, 100000, 0);
   const SurfaceCells cells = SurfaceCells::Build(*prepared.world, 4096);
   PhotonMap map;

@@ -18,7 +18,8 @@ SceneBuilder Floor() {
   SceneBuilder builder({kPage, kPage});
   const int black = builder.AddMaterial(Rgb{0, 0, 0});
   // cross(edge_u, edge_v) = +y.
-  builder.AddQuad({-1, 0, -1}, {0, 0, kSide}, {kSide, 0, 0}, {.material = black, .lightmapped = true, .page = {0, 0, kPage, kPage}, .name = "floor"});
+  builder.AddQuad({-1, 0, -1}, {0, 0, kSide}, {kSide, 0, 0},
+                  {.material = black, .lightmapped = true, .page = {0, 0, kPage, kPage}, .name = "floor"});
   return builder;
 }
 
@@ -60,10 +61,13 @@ Errors Compare(const Scene& scene, const Irradiance& closed_form, int samples) {
 TEST(DirectLight, PointIsIntensityTimesCosineOverSquaredDistance) {
   SceneBuilder builder = Floor();
   builder.AddPointLight({0.3, 1.2, -0.2}, {3, 5, 7});
-  const Errors errors = Compare(builder.Build(), [](Vec3d p) {
-    const Vec3d d = Vec3d{0.3, 1.2, -0.2} - p;
-    return 5 * d.y / std::pow(Length(d), 3);
-  }, 64);
+  const Errors errors = Compare(
+      builder.Build(),
+      [](Vec3d p) {
+        const Vec3d d = Vec3d{0.3, 1.2, -0.2} - p;
+        return 5 * d.y / std::pow(Length(d), 3);
+      },
+      64);
   EXPECT_NEAR(errors.mean, 0, 1e-4);
   EXPECT_LT(errors.rms, 1e-3);
 }
@@ -72,12 +76,15 @@ TEST(DirectLight, SpotFallsOffAsKhrLightsPunctualRecommends) {
   SceneBuilder builder = Floor();
   const double inner = 0.4, outer = 1.2;
   builder.AddSpotLight({0, 1, 0}, {0, -1, 0}, {5, 5, 5}, inner, outer);
-  const Errors errors = Compare(builder.Build(), [&](Vec3d p) {
-    const Vec3d d = Vec3d{0, 1, 0} - p;
-    const double cosine = d.y / Length(d);
-    const double falloff = std::clamp((cosine - std::cos(outer)) / (std::cos(inner) - std::cos(outer)), 0.0, 1.0);
-    return 5 * falloff * falloff * d.y / std::pow(Length(d), 3);
-  }, 256);
+  const Errors errors = Compare(
+      builder.Build(),
+      [&](Vec3d p) {
+        const Vec3d d = Vec3d{0, 1, 0} - p;
+        const double cosine = d.y / Length(d);
+        const double falloff = std::clamp((cosine - std::cos(outer)) / (std::cos(inner) - std::cos(outer)), 0.0, 1.0);
+        return 5 * falloff * falloff * d.y / std::pow(Length(d), 3);
+      },
+      256);
   EXPECT_NEAR(errors.mean, 0, 1e-4);
   EXPECT_LT(errors.rms, 1e-3);
 }
@@ -87,7 +94,8 @@ TEST(DirectLight, DirectionalIsIrradianceTimesCosine) {
     SceneBuilder builder = Floor();
     builder.AddDirectionalLight({0.3, -0.9, 0.2}, {2, 2, 2}, diameter);
     const double cosine = 0.9 / std::sqrt(0.09 + 0.81 + 0.04);
-    const Errors errors = Compare(builder.Build(), [&](Vec3d) { return 2 * cosine; }, 64);
+    const Errors errors = Compare(
+        builder.Build(), [&](Vec3d) { return 2 * cosine; }, 64);
     EXPECT_NEAR(errors.mean, 0, 1e-4) << diameter;
     EXPECT_LT(errors.rms, 1e-3) << diameter;
   }
@@ -96,7 +104,8 @@ TEST(DirectLight, DirectionalIsIrradianceTimesCosine) {
 TEST(DirectLight, UniformSkyIsPiTimesRadiance) {
   SceneBuilder builder = Floor();
   builder.SetConstantSky({0.5f, 2, 0.25f});
-  const Errors errors = Compare(builder.Build(), [](Vec3d) { return 2 * kPi; }, 1024);
+  const Errors errors = Compare(
+      builder.Build(), [](Vec3d) { return 2 * kPi; }, 1024);
   EXPECT_NEAR(errors.mean, 0, 1e-4);
   EXPECT_LT(errors.rms, 1e-3);
 }
@@ -110,7 +119,8 @@ TEST(DirectLight, GradientSkyIntegratesHorizonAndZenith) {
   sky.ground = {9, 9, 9};
   builder.SetEnvironment(sky);
   // integral of (h + (z - h) y) y over the upper hemisphere = pi h + (z - h) 2 pi / 3.
-  const Errors errors = Compare(builder.Build(), [](Vec3d) { return kPi + 3 * 2 * kPi / 3; }, 1024);
+  const Errors errors = Compare(
+      builder.Build(), [](Vec3d) { return kPi + 3 * 2 * kPi / 3; }, 1024);
   EXPECT_NEAR(errors.mean, 0, 1e-4);
   EXPECT_LT(errors.rms, 1e-3);
 }
@@ -126,7 +136,8 @@ TEST(DirectLight, LatLongSkyEqualsItsClosedForm) {
   builder.SetEnvironment(sky);
   const double c0 = std::cos(kPi / 8), c1 = std::cos(kPi / 4);
   const double expected = 50 * (kPi / 4) * (c0 * c0 - c1 * c1) / 2;
-  const Errors errors = Compare(builder.Build(), [&](Vec3d) { return expected; }, 1024);
+  const Errors errors = Compare(
+      builder.Build(), [&](Vec3d) { return expected; }, 1024);
   EXPECT_NEAR(errors.mean, 0, 5e-4);
   EXPECT_LT(errors.rms, 5e-3);
 }
@@ -147,8 +158,14 @@ TEST(DirectLight, RectangleFollowsLambertsContourFormula) {
     const int emitter = builder.AddMaterial({0, 0, 0}, {4, 4, 4});
     // cross(u, v) = -y: faces the floor.
     builder.AddQuad({-0.4, height, -0.3}, {0.9, 0, 0}, {0, 0, 0.7}, {.material = emitter, .lightmapped = false});
-    const std::vector<Vec3d> corners = {{-0.4, height, -0.3}, {0.5, height, -0.3}, {0.5, height, 0.4}, {-0.4, height, 0.4}};
-    const Errors errors = Compare(builder.Build(), [&](Vec3d p) { return 4 * PolygonIrradiance(corners, p, {0, 1, 0}); }, 1024);
+    const std::vector<Vec3d> corners = {
+        {-0.4, height, -0.3}, {0.5, height, -0.3}, {0.5, height, 0.4}, {-0.4, height, 0.4}};
+    const Errors errors = Compare(
+        builder.Build(),
+        [&](Vec3d p) {
+          return 4 * PolygonIrradiance(corners, p, {0, 1, 0});
+        },
+        1024);
     EXPECT_NEAR(errors.mean, 0, 1e-3) << height;
     EXPECT_LT(errors.rms, 1e-2) << height;
   }
@@ -160,7 +177,12 @@ TEST(DirectLight, RectangleThatStandsUprightFollowsLambertsContourFormula) {
   // In the plane x = -1.2, faces +x.
   builder.AddQuad({-1.2, 0.1, -0.5}, {0, 1, 0}, {0, 0, 1}, {.material = emitter, .lightmapped = false});
   const std::vector<Vec3d> corners = {{-1.2, 0.1, -0.5}, {-1.2, 1.1, -0.5}, {-1.2, 1.1, 0.5}, {-1.2, 0.1, 0.5}};
-  const Errors errors = Compare(builder.Build(), [&](Vec3d p) { return 4 * PolygonIrradiance(corners, p, {0, 1, 0}); }, 1024);
+  const Errors errors = Compare(
+      builder.Build(),
+      [&](Vec3d p) {
+        return 4 * PolygonIrradiance(corners, p, {0, 1, 0});
+      },
+      1024);
   EXPECT_NEAR(errors.mean, 0, 1e-3);
   EXPECT_LT(errors.rms, 1e-2);
 }
@@ -178,10 +200,13 @@ TEST(DirectLight, DiscFollowsItsClosedForm) {
                         {.material = emitter, .lightmapped = false});
   }
   // Parallel disc at lateral distance a (Howell, configuration factor B-13).
-  const Errors errors = Compare(builder.Build(), [&](Vec3d p) {
-    const double a2 = p.x * p.x + p.z * p.z, h2 = h * h, r2 = radius * radius;
-    return 4 * kPi / 2 * (1 - (a2 + h2 - r2) / std::sqrt((a2 + h2 + r2) * (a2 + h2 + r2) - 4 * a2 * r2));
-  }, 1024);
+  const Errors errors = Compare(
+      builder.Build(),
+      [&](Vec3d p) {
+        const double a2 = p.x * p.x + p.z * p.z, h2 = h * h, r2 = radius * radius;
+        return 4 * kPi / 2 * (1 - (a2 + h2 - r2) / std::sqrt((a2 + h2 + r2) * (a2 + h2 + r2) - 4 * a2 * r2));
+      },
+      1024);
   EXPECT_NEAR(errors.mean, 0, 1e-3);
   EXPECT_LT(errors.rms, 1e-2);
 }
@@ -193,10 +218,14 @@ TEST(DirectLight, SphereIsPiRadianceTimesSquaredSine) {
   const Vec3d center{0.1, 1.1, 0.2};
   constexpr int n = 64;
   builder.AddSphere(center, radius, n, {.material = emitter, .lightmapped = false});
-  const Errors errors = Compare(builder.Build(), [&](Vec3d p) {
-    const Vec3d d = center - p;
-    return 4 * kPi * radius * radius * d.y / std::pow(Length(d), 3);  // E = pi L r^2/d^2 times the cosine (RTR 10.8)
-  }, 1024);
+  const Errors errors = Compare(
+      builder.Build(),
+      [&](Vec3d p) {
+        const Vec3d d = center - p;
+        return 4 * kPi * radius * radius * d.y /
+               std::pow(Length(d), 3);  // E = pi L r^2/d^2 times the cosine (RTR 10.8)
+      },
+      1024);
   // The mesh lies inside the sphere: its silhouette is smaller by up to (pi/2n)^2 = 6e-4.
   EXPECT_NEAR(errors.mean, 0, 1.5e-3);
   EXPECT_LT(errors.rms, 1e-2);
@@ -210,15 +239,21 @@ TEST(DirectLight, TubeFollowsItsClosedForm) {
   const double radius = 0.001 * (kPi / kSides) / std::sin(kPi / kSides);  // the perimeter of a tube of radius 0.001
   for (int i = 0; i < kSides; ++i) {
     const double a = 2 * kPi * i / kSides, b = 2 * kPi * (i + 1) / kSides;
-    const Vec3d p{-half, h + radius * std::cos(a), radius * std::sin(a)}, q{-half, h + radius * std::cos(b), radius * std::sin(b)};
+    const Vec3d p{-half, h + radius * std::cos(a), radius * std::sin(a)},
+        q{-half, h + radius * std::cos(b), radius * std::sin(b)};
     builder.AddQuad(p, q - p, {2 * half, 0, 0}, {.material = emitter, .lightmapped = false});
   }
   // A thin Lambertian tube along x: dE = 2 r L sin(angle to the axis) cos / d^2 ds.
-  const Errors errors = Compare(builder.Build(), [&](Vec3d p) {
-    const double d2 = h * h + p.z * p.z;  // squared distance to the axis
-    const auto integral = [&](double s) { return s / (2 * d2 * (d2 + s * s)) + std::atan(s / std::sqrt(d2)) / (2 * std::pow(d2, 1.5)); };
-    return 2 * 0.001 * 1000 * h * std::sqrt(d2) * (integral(half - p.x) - integral(-half - p.x));
-  }, 1024);
+  const Errors errors = Compare(
+      builder.Build(),
+      [&](Vec3d p) {
+        const double d2 = h * h + p.z * p.z;  // squared distance to the axis
+        const auto integral = [&](double s) {
+          return s / (2 * d2 * (d2 + s * s)) + std::atan(s / std::sqrt(d2)) / (2 * std::pow(d2, 1.5));
+        };
+        return 2 * 0.001 * 1000 * h * std::sqrt(d2) * (integral(half - p.x) - integral(-half - p.x));
+      },
+      1024);
   EXPECT_NEAR(errors.mean, 0, 1e-3);  // thin: what the ends show of the radius is r/h = 1e-3 of a part of it
   EXPECT_LT(errors.rms, 1e-2);
 }

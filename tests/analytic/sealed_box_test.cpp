@@ -8,8 +8,8 @@
 namespace bakewell {
 namespace {
 
-// A lit room and a sealed dark one, side by side on one floor quad under one ceiling quad, a wall of `thickness` between
-// them, the whole turned by `angle` about y so that no grid lines up with the wall.
+// A lit room and a sealed dark one, side by side on one floor quad under one ceiling quad, a wall of `thickness`
+// between them, the whole turned by `angle` about y so that no grid lines up with the wall.
 Scene TwoRooms(double thickness, double angle) {
   SceneBuilder builder({64, 64});
   const int grey = builder.AddMaterial(Rgb{0.7f, 0.7f, 0.7f});
@@ -18,13 +18,13 @@ Scene TwoRooms(double thickness, double angle) {
   const auto quad = [&](Vec3d origin, Vec3d u, Vec3d v, PageRect page) {
     builder.AddQuad(turn(origin), turn(u), turn(v), {.material = grey, .lightmapped = page.width > 0, .page = page});
   };
-  quad({-4, 0, -2}, {0, 0, 4}, {8, 0, 0}, {0, 0, 32, 64});    // floor, up
-  quad({-4, 3, -2}, {8, 0, 0}, {0, 0, 4}, {32, 0, 32, 32});   // ceiling, down
-  quad({-4, 0, -2}, {8, 0, 0}, {0, 3, 0}, {});                // sides
+  quad({-4, 0, -2}, {0, 0, 4}, {8, 0, 0}, {0, 0, 32, 64});   // floor, up
+  quad({-4, 3, -2}, {8, 0, 0}, {0, 0, 4}, {32, 0, 32, 32});  // ceiling, down
+  quad({-4, 0, -2}, {8, 0, 0}, {0, 3, 0}, {});               // sides
   quad({-4, 0, 2}, {0, 3, 0}, {8, 0, 0}, {});
   quad({-4, 0, -2}, {0, 3, 0}, {0, 0, 4}, {});
   quad({4, 0, -2}, {0, 0, 4}, {0, 3, 0}, {});
-  quad({0, 0, -2}, {0, 0, 4}, {0, 3, 0}, {});                 // the wall's two faces
+  quad({0, 0, -2}, {0, 0, 4}, {0, 3, 0}, {});  // the wall's two faces
   quad({thickness, 0, -2}, {0, 3, 0}, {0, 0, 4}, {});
   builder.AddPointLight(turn({-2, 2, 0}), {10, 10, 10});
   return builder.Build();

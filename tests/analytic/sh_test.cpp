@@ -9,7 +9,8 @@ namespace {
 SceneBuilder BlackFloor() {
   SceneBuilder builder({8, 8});
   const int black = builder.AddMaterial(Rgb{0, 0, 0});
-  builder.AddQuad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, {.material = black, .lightmapped = true, .page = {0, 0, 8, 8}, .name = "floor"});
+  builder.AddQuad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0},
+                  {.material = black, .lightmapped = true, .page = {0, 0, 8, 8}, .name = "floor"});
   return builder;
 }
 
@@ -38,7 +39,8 @@ TEST(SphericalHarmonics, UniformSkyGivesTheHemispheresMoments) {
   // azimuth: Y6 = c6 (3 z^2 - 1), Y8 = c8 (x^2 - y^2), z^2 and x^2 integrate to 2 pi/3, y^2 to 2 pi/3: both vanish.
   const double expected[kShCoefficients] = {2 * 2 * kPi * 0.28209479, 2 * kPi * 0.48860251, 0, 0, 0, 0, 0, 0, 0};
   for (const TexelLight& light : result.lights()) {
-    for (size_t i = 0; i < kShCoefficients; ++i) EXPECT_NEAR(light.sh.lambda[i].x, expected[i], 0.01) << i;  // 0.3 % of lambda_0
+    for (size_t i = 0; i < kShCoefficients; ++i)
+      EXPECT_NEAR(light.sh.lambda[i].x, expected[i], 0.01) << i;  // 0.3 % of lambda_0
   }
 }
 

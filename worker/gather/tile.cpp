@@ -14,7 +14,8 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
-Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Vec3f from, Vec3f dir, float pdf, const Hit& hit) {
+Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Vec3f from, Vec3f dir, float pdf,
+                  const Hit& hit) {
   if (!hit) {
     const EnvironmentLight& sky = scene.lights.environment();
     if (!sky.bright()) return {};
@@ -44,8 +45,8 @@ struct Work {
 
 class TileGatherer {
  public:
-  TileGatherer(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, const GatherOptions& options,
-               GatherCounters& counters)
+  TileGatherer(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end,
+               const GatherOptions& options, GatherCounters& counters)
       : scene_(scene), map_(map), begin_(begin), end_(end), options_(options), counters_(counters) {}
 
   std::vector<TexelLight> Run(const AtlasLayout& layout) {
@@ -160,8 +161,10 @@ class TileGatherer {
       const float irradiance = Luminance(work.direct.Irradiance() + work.indirect.Irradiance());
       const float scale = options_.target_error * std::max(irradiance, options_.floor_share * options_.mean_irradiance);
       const float budget = 0.5f * scale * scale;
-      active[i] = {work.direct_active && PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
-                   work.indirect_active && PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.indirect; }) > budget};
+      active[i] = {work.direct_active &&
+                       PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
+                   work.indirect_active &&
+                       PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.indirect; }) > budget};
     }
     for (size_t i = 0; i < work_.size(); ++i) {
       work_[i].direct_active = active[i][0];

@@ -31,15 +31,16 @@ float SpotCosine(const PunctualLight& light, float u) {
 Photon FromPunctual(const PunctualLight& light, Vec2f u, double photons) {
   const Frame frame = FrameFromHint(light.direction, light.tangent);
   if (light.type == LightType::kPoint) {
-    return {light.position, frame.ToWorld(UniformSphere(u)), light.intensity * static_cast<float>(4 * kPi / photons), 0};
+    return {light.position, frame.ToWorld(UniformSphere(u)), light.intensity * static_cast<float>(4 * kPi / photons),
+            0};
   }
   const float flat = 1 - light.cos_inner, rim = (light.cos_inner - light.cos_outer) / 3;
   return {light.position, frame.ToWorld(DirectionFromCosine(SpotCosine(light, u.x), u.y)),
           light.intensity * static_cast<float>(2 * kPi * static_cast<double>(flat + rim) / photons), 0};
 }
 
-Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_position, Vec2f u_direction, float u_side,
-                    double photons) {
+Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_position, Vec2f u_direction,
+                    float u_side, double photons) {
   const Triangle& t = world.triangles()[light.triangle];
   const Vec2f b = TriangleFromSquare(u_position);
   const SurfacePoint point = world.PointAt(light.triangle, b.x, b.y, light.two_sided && u_side < 0.5f);
@@ -47,15 +48,18 @@ Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_p
   const double sides = light.two_sided ? 2 : 1;
   return {RayOrigin(point), frame.ToWorld(CosineHemisphere(u_direction)),
           world.FrontEmissionAt(light.triangle, b.x, b.y) *
-              static_cast<float>(kPi * static_cast<double>(light.area) * sides / photons), 0};
+              static_cast<float>(kPi * static_cast<double>(light.area) * sides / photons),
+          0};
 }
 
 // A photon that crosses the square of side 2R behind the scene at `point`.
-Photon FromSquare(const World& world, const Frame& frame, const EmissionGuide::SquarePoint& point, Rgb per_area, double photons) {
+Photon FromSquare(const World& world, const Frame& frame, const EmissionGuide::SquarePoint& point, Rgb per_area,
+                  double photons) {
   const float r = world.radius();
   const float area = 4 * r * r;
   const Vec3f on_square = world.center() + frame.t * (point.position.x * r) + frame.b * (point.position.y * r);
-  return {on_square + frame.n * (2 * r), -frame.n, per_area * static_cast<float>(area / (static_cast<double>(point.density) * photons)), 0};
+  return {on_square + frame.n * (2 * r), -frame.n,
+          per_area * static_cast<float>(area / (static_cast<double>(point.density) * photons)), 0};
 }
 
 class Emitter {
@@ -128,7 +132,8 @@ class Tracer {
       Accumulate(totals_.absorbed, {before[0] - after[0], before[1] - after[1], before[2] - after[2]});
       const Frame frame = FrameFromHint(point.normal, world_.triangles()[hit.triangle].e1);
       const Vec2f scatter{Random(photon, u, bounce, 0), Random(photon, u, bounce, 1)};
-      ray = {RayOrigin(point), frame.ToWorld(CosineHemisphere(scatter)), kInfinity, photon.key + static_cast<uint32_t>(bounce) + 1};
+      ray = {RayOrigin(point), frame.ToWorld(CosineHemisphere(scatter)), kInfinity,
+             photon.key + static_cast<uint32_t>(bounce) + 1};
     }
   }
 
@@ -193,7 +198,8 @@ float UsefulFlux(const LightSet& lights, const EmissionGuide& guide, const Photo
 // A bound of the flux that one of the source's photons carries, from its closed form.
 float MaxWeight(const LightSet& lights, const PhotonSource& source) {
   const double n = static_cast<double>(source.count);
-  const double square = 4.0 * static_cast<double>(lights.world().radius()) * static_cast<double>(lights.world().radius());
+  const double square =
+      4.0 * static_cast<double>(lights.world().radius()) * static_cast<double>(lights.world().radius());
   const double share = EmissionGuide::kUniformShare;
   double flux = 0;
   if (source.kind == PhotonSource::Kind::kDirectional) {

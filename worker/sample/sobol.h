@@ -8,9 +8,9 @@
 
 namespace bakewell {
 
-// Owen-scrambled Sobol points. A Sampler is one point set of up to kSobolDimensions dimensions: point `index` of the set
-// keyed `key`. Sets with different keys are independent (padding, Burley 2020, "Practical Hash-based Owen Scrambling").
-// Any power-of-two prefix of a set is a (t, m, s)-net.
+// Owen-scrambled Sobol points. A Sampler is one point set of up to kSobolDimensions dimensions: point `index` of the
+// set keyed `key`. Sets with different keys are independent (padding, Burley 2020, "Practical Hash-based Owen
+// Scrambling"). Any power-of-two prefix of a set is a (t, m, s)-net.
 inline constexpr int kSobolDimensions = 8;
 
 // Coordinate of Sobol point `index` before scrambling, bits reversed (first digit in the lowest bit).

@@ -46,7 +46,8 @@ inline ConvexPolygon ClipToSquare(const ConvexPolygon& triangle, Vec2d corner, d
 }
 
 // Calls visit(x, y, polygon) for every cell of the grid [0, width) x [0, height) that the triangle covers with an area
-// above zero, with the exact part inside the cell. Row by row, so the cost is that of the cells, not of the bounding box.
+// above zero, with the exact part inside the cell. Row by row, so the cost is that of the cells, not of the bounding
+// box.
 template <typename Visit>
 void RasterizeExact(Vec2d a, Vec2d b, Vec2d c, int width, int height, Visit visit) {
   const ConvexPolygon triangle{3, {a, b, c}};

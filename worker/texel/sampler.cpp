@@ -42,13 +42,14 @@ void TexelSampler::AddFragment(const World& world, const AtlasLayout& layout, co
   const PageToWorld map = MapOf(t, corners);
   const SurfacePoint point = world.PointAt(fragment.triangle, 0, 0, false);
   sides_.push_back({FrameFromHint(t.normal, ToFloat(NormalizeOrZero(map.per_x))), point.offset});
-  radius_ = std::max(radius_, static_cast<float>(0.5 * std::max(Length(map.per_x + map.per_y), Length(map.per_x - map.per_y))));
+  radius_ = std::max(radius_,
+                     static_cast<float>(0.5 * std::max(Length(map.per_x + map.per_y), Length(map.per_x - map.per_y))));
   const auto add = [&](Vec2d a, Vec2d b, Vec2d c, bool whole, double share) {
     const float before = parts_.empty() ? 0.0f : parts_.back().cdf;
     const Vec3d p = map.At(a);
-    parts_.push_back({ToFloat(p), ToFloat(map.At(b) - p), ToFloat(map.At(c) - p), ToUnit(a, texel), ToUnit(b, texel) - ToUnit(a, texel),
-                      ToUnit(c, texel) - ToUnit(a, texel), whole, static_cast<uint16_t>(sides_.size() - 1),
-                      before + static_cast<float>(share)});
+    parts_.push_back({ToFloat(p), ToFloat(map.At(b) - p), ToFloat(map.At(c) - p), ToUnit(a, texel),
+                      ToUnit(b, texel) - ToUnit(a, texel), ToUnit(c, texel) - ToUnit(a, texel), whole,
+                      static_cast<uint16_t>(sides_.size() - 1), before + static_cast<float>(share)});
   };
   if (area > window.side * window.side * (1 - 1e-6)) {
     return add(window.corner, window.corner + Vec2d{window.side, 0}, window.corner + Vec2d{0, window.side}, true, area);

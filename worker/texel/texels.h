@@ -21,12 +21,12 @@ struct Texel {
   int32_t x = 0, y = 0;
   int32_t chart = kNoChart;
   uint32_t fragment_begin = 0, fragment_end = 0;  // TexelMap::fragments
-  float coverage = 0;    // share of the square that triangles cover, (0, 1] (above 1 where charts overlap)
-  float area = 0;        // of the covered surface [m^2]
-  Vec3f position;        // centroid of the covered surface [m]
-  Vec3f normal;          // unit, geometric, area-weighted
-  Vec3f smooth_normal;   // unit, interpolated shading normal
-  bool flat = true;      // all fragments share the normal
+  float coverage = 0;   // share of the square that triangles cover, (0, 1] (above 1 where charts overlap)
+  float area = 0;       // of the covered surface [m^2]
+  Vec3f position;       // centroid of the covered surface [m]
+  Vec3f normal;         // unit, geometric, area-weighted
+  Vec3f smooth_normal;  // unit, interpolated shading normal
+  bool flat = true;     // all fragments share the normal
 };
 
 // All covered texels of a layout, sorted by page, then tile (16 x 16 texels, row by row), then y, x.
