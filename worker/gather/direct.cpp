@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
 
@@ -73,7 +74,7 @@ class DirectAdder {
     ++counters_.shadow_rays;
     if (scene_.world.Occluded(ShadowRay(point.surface, sample, key))) return;
     const float light_pdf = sample.pdf * probability;
-    const float weight = sample.pdf > 0 ? light_pdf / (light_pdf + GatherPdf(cosine)) : 1.0f;
+    const float weight = sample.pdf > 0 ? PowerHeuristic(light_pdf, GatherPdf(cosine)) : 1.0f;
     const Rgb radiance_over_pdf = sample.perpendicular * (weight / probability);
     if (!IsFinite(radiance_over_pdf)) {
       ++counters_.bad_samples;

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "worker/gather/direct.h"
+#include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
 #include "worker/texel/validity.h"
@@ -19,7 +20,7 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Ve
   if (!hit) {
     const EnvironmentLight& sky = scene.lights.environment();
     if (!sky.bright()) return {};
-    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : pdf / (pdf + sky.Pdf(dir)));
+    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : PowerHeuristic(pdf, sky.Pdf(dir)));
   }
   const int light = scene.lights.LightOfTriangle(hit.triangle);
   if (light < 0) return {};
@@ -27,7 +28,7 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Ve
   if (MaxComponent(emission) <= 0) return {};
   const float chosen = choice.empty() ? 0 : choice.probability_of_light[light];
   const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from, dir, hit.t) : 0;
-  return emission * (pdf / (pdf + light_pdf));
+  return emission * PowerHeuristic(pdf, light_pdf);
 }
 
 // Everything about one texel while its tile is in flight.
@@ -159,7 +160,9 @@ class TileGatherer {
     for (size_t i = 0; i < work_.size(); ++i) {
       const Work& work = work_[i];
       const float irradiance = Luminance(work.direct.Irradiance() + work.indirect.Irradiance());
-      const float scale = options_.target_error * std::max(irradiance, options_.floor_share * options_.mean_irradiance);
+      // Between equal absolute and equal relative errors: what matters to the root mean square and to the eye.
+      const float mean = options_.mean_irradiance;
+      const float scale = options_.target_error * std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
       const float budget = 0.5f * scale * scale;
       active[i] = {work.direct_active &&
                        PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
