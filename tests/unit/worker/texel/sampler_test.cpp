@@ -12,16 +12,16 @@ namespace {
 
 constexpr int kPage = 4, kSub = 8;
 
-// A right triangle with legs of 4 m along +x and -z on a page of 4 x 4 texels: page (x, y) is world (x, 0, -y).
+// A right triangle with legs of 3.75 m along +x and -z, a texel a metre: page (x, y) is world (x, 0, -y).
 Scene HalfPage() {
   SceneBuilder builder({kPage, kPage});
-  builder.AddTriangle({0, 0, 0}, {4, 0, 0}, {0, 0, -4}, {.page = {0, 0, kPage, kPage}});
+  builder.AddTriangle({0, 0, 0}, {3.75, 0, 0}, {0, 0, -3.75}, {.page = {0, 0, 3.75f, 3.75f}});
   return builder.Build();
 }
 
 // The part of the triangle in a square of the page.
 double AreaIn(Vec2d corner, double side) {
-  return std::fabs(ClipToSquare({3, {Vec2d{0, 0}, {4, 0}, {0, 4}}}, corner, side).SignedArea());
+  return std::fabs(ClipToSquare({3, {Vec2d{0, 0}, {3.75, 0}, {0, 3.75}}}, corner, side).SignedArea());
 }
 
 // z-score of points against the uniform density over the part of the texel's footprint that is covered.
@@ -38,7 +38,7 @@ double Uniformity(const PreparedLevel& prepared, const Texel& texel, double foot
     const Vec3d p = ToDouble(point.surface.position) + origin;
     EXPECT_TRUE(point.valid);
     EXPECT_NEAR(p.y, 0, 1e-6);
-    EXPECT_LE(p.x - p.z, 4 + 1e-5);
+    EXPECT_LE(p.x - p.z, 3.75 + 1e-5);
     const double x = (p.x - corner.x) / footprint, y = (-p.z - corner.y) / footprint;
     EXPECT_GE(std::min(x, y), -1e-5);
     EXPECT_LE(std::max(x, y), 1 + 1e-5);
@@ -61,10 +61,36 @@ TEST(TexelSampler, PointsAreUniformOverTheCoveredFootprint) {
     const PreparedLevel prepared = PrepareInMemory(HalfPage(), settings);
     int cut = 0;
     for (const Texel& texel : prepared.texels.texels) {
+      // Cut, but with the triangle under the centre: mirrored, see below.
+      if (footprint == 1.0f && texel.x + texel.y == 2) continue;
       cut += texel.coverage < 0.9f ? 1 : 0;
       EXPECT_LT(Uniformity(prepared, texel, static_cast<double>(footprint)), 4) << texel.x << " " << texel.y;
     }
     EXPECT_EQ(cut, 4);
+  }
+}
+
+TEST(TexelSampler, PointsThatLeaveTheTriangleUnderTheCentreAreMirroredIntoIt) {
+  BakeSettings settings;
+  settings.footprint = 1;
+  const PreparedLevel prepared = PrepareInMemory(HalfPage(), settings);
+  const Vec3d origin = prepared.level->scene.origin_ws;
+  for (const Texel& texel : prepared.texels.texels) {
+    if (texel.x + texel.y != 2) continue;
+    const TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
+    TestRandom random(4);
+    int inside = 0;
+    constexpr int n = 20000;
+    for (int i = 0; i < n; ++i) {
+      const Vec3d p = ToDouble(sampler.At(random.Square()).surface.position) + origin;
+      EXPECT_NEAR(p.y, 0, 1e-6);
+      EXPECT_LE(p.x - p.z, 3.75 + 1e-5);
+      EXPECT_GE(std::min(p.x, -p.z), -1e-5);
+      const double x = p.x - texel.x, y = -p.z - texel.y;
+      inside += std::min(x, y) > -1e-5 && std::max(x, y) < 1 + 1e-5 ? 1 : 0;
+    }
+    // A corner of 1/32 of the square is folded in; it lands in the square again.
+    EXPECT_EQ(inside, n) << texel.x << " " << texel.y;
   }
 }
 
