@@ -20,7 +20,8 @@ struct Camera {
 };
 
 Vec3f Argument(char** words) {
-  return {static_cast<float>(std::atof(words[0])), static_cast<float>(std::atof(words[1])), static_cast<float>(std::atof(words[2]))};
+  return {static_cast<float>(std::atof(words[0])), static_cast<float>(std::atof(words[1])),
+          static_cast<float>(std::atof(words[2]))};
 }
 
 Rgb Bilinear(const Image& page, float x, float y) {
@@ -57,10 +58,16 @@ Image Render(const PreparedLevel& level, const std::vector<Image>& pages, const 
     for (int x = 0; x < width; ++x) {
       Rgb sum;
       for (int s = 0; s < kSide * kSide; ++s) {
-        const float px = (static_cast<float>(x) + (static_cast<float>(s % kSide) + 0.5f) / kSide) / static_cast<float>(width) * 2 - 1;
-        const float py = 1 - (static_cast<float>(y) + (static_cast<float>(s / kSide) + 0.5f) / kSide) / static_cast<float>(height) * 2;
-        const Vec3f dir = camera.forward + camera.right * (px * camera.tan_half * camera.aspect) + camera.up * (py * camera.tan_half);
-        sum += Shade(level, pages, {camera.position, NormalizeOrZero(dir), std::numeric_limits<float>::infinity(), static_cast<uint32_t>(s)});
+        const float px =
+            (static_cast<float>(x) + (static_cast<float>(s % kSide) + 0.5f) / kSide) / static_cast<float>(width) * 2 -
+            1;
+        const float py = 1 - (static_cast<float>(y) + (static_cast<float>(s / kSide) + 0.5f) / kSide) /
+                                 static_cast<float>(height) * 2;
+        const Vec3f dir =
+            camera.forward + camera.right * (px * camera.tan_half * camera.aspect) + camera.up * (py * camera.tan_half);
+        sum += Shade(
+            level, pages,
+            {camera.position, NormalizeOrZero(dir), std::numeric_limits<float>::infinity(), static_cast<uint32_t>(s)});
       }
       for (int c = 0; c < 3; ++c) picture.At(c, x, y) = sum[c] / (kSide * kSide);
       picture.At(3, x, y) = 1;
@@ -71,7 +78,8 @@ Image Render(const PreparedLevel& level, const std::vector<Image>& pages, const 
 
 int Main(int argc, char** argv) {
   if (argc < 10) {
-    std::fprintf(stderr, "usage: render_level scene.glb baked_folder picture.png px py pz tx ty tz [fov] [width height]\n");
+    std::fprintf(stderr,
+                 "usage: render_level scene.glb baked_folder picture.png px py pz tx ty tz [fov] [width height]\n");
     return 2;
   }
   auto loaded = LoadLevel(argv[1]);
@@ -97,7 +105,8 @@ int Main(int argc, char** argv) {
   camera.up = Cross(camera.right, camera.forward);
   camera.tan_half = std::tan((argc > 10 ? static_cast<float>(std::atof(argv[10])) : 60.0f) * kPiF / 360);
   camera.aspect = static_cast<float>(width) / static_cast<float>(height);
-  const absl::Status written = WritePng(argv[3], width, height, TonemapPreview(Render(*level, pages, camera, width, height)));
+  const absl::Status written =
+      WritePng(argv[3], width, height, TonemapPreview(Render(*level, pages, camera, width, height)));
   if (!written.ok()) return std::fprintf(stderr, "%s\n", std::string(written.message()).c_str()), 1;
   return 0;
 }

@@ -19,8 +19,8 @@ SphericalTriangle::SphericalTriangle(Vec3f a, Vec3f b, Vec3f c) : a_(a), b_(b), 
   solid_angle_ = 2 * std::atan2(volume, 1 + Dot(x, y) + Dot(y, z) + Dot(z, x));
 }
 
-// In double: the formula subtracts nearly equal sines, and in single precision the points of a triangle of a hundredth of
-// a steradian end up a tenth of a per cent off (seen against Lambert's contour formula).
+// In double: the formula subtracts nearly equal sines, and in single precision the points of a triangle of a hundredth
+// of a steradian end up a tenth of a per cent off (seen against Lambert's contour formula).
 Vec3f SphericalTriangle::Draw(Vec2f u) const {
   const Vec3d a = Unit(a_), b = Unit(b_), c = Unit(c_);
   const Vec3d normal_ab = NormalizeOrZero(Cross(a, b)), normal_ac = NormalizeOrZero(Cross(a, c));
