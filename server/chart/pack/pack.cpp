@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "core/base/check.h"
@@ -21,12 +22,13 @@ constexpr int kSketchSide = 256;  // cells of the coarse pages on which plans ar
 
 // How hard to look.
 struct Effort {
-  int trials;     // densities
-  int plans;      // orders and page shapes that are sketched, for few charts
-  int finalists;  // of them, those that get a density search
+  int trials;         // densities
+  int plans;          // orders and page shapes that are sketched, for few charts
+  int semifinalists;  // of them, those that are packed at full size
+  int finalists;      // of those, the ones that get a density search
   int tilts;
 };
-constexpr Effort kNormalEffort{6, 108, 2, 2}, kBruteEffort{16, 432, 6, 4};
+constexpr Effort kNormalEffort{5, 108, 8, 1, 2}, kBruteEffort{12, 432, 32, 4, 4};
 
 struct Plan {
   Order order;
@@ -73,27 +75,38 @@ std::vector<Plan> MakePlans(int count, bool free_shape) {
   return plans;
 }
 
-// Packs every plan at one coarse density and sorts them by the page area they use.
-std::vector<Plan> RankPlans(std::span<const PackItem> items, std::vector<Plan> plans, Raster raster, double texels) {
-  const double shrink = kSketchSide / std::sqrt(texels);
-  raster.texels_per_unit =
-      std::min(EstimateDensity(items, raster.gutter, 0.85 * texels), LargestUnclampedDensity(items, raster)) * shrink;
-  raster.cell = 1;
-  raster.gutter = 0;
-  const std::vector<Candidate> candidates = MakeCandidates(items, raster);
+// Packs every plan at one density and sorts them by the page area they use.
+std::vector<Plan> RankPlans(std::span<const Candidate> candidates, const std::vector<Plan>& plans, double page_texels,
+                            int cell) {
   std::vector<double> area(plans.size());
   tbb::parallel_for(size_t{0}, plans.size(), [&](size_t i) {
-    Grid grid = GridOf(kSketchSide * kSketchSide, plans[i].aspect, 1);
+    Grid grid = GridOf(page_texels, plans[i].aspect, cell);
     grid.height *= 3;
     const Trial trial = PlaceAll(grid, candidates, plans[i].order);
     area[i] = trial.complete ? double(trial.used_height) * grid.width : INFINITY;
   });
   std::vector<size_t> order(plans.size());
-  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return area[a] < area[b]; });
   std::vector<Plan> ranked;
   for (const size_t i : order) ranked.push_back(plans[i]);
   return ranked;
+}
+
+// The best plans, first by coarse sketches without gutters, then by whole texels.
+std::vector<Plan> BestPlans(std::span<const PackItem> items, std::vector<Plan> plans, Raster raster, double texels,
+                            const Effort& effort) {
+  raster.texels_per_unit =
+      std::min(EstimateDensity(items, raster.gutter, 0.85 * texels), LargestUnclampedDensity(items, raster));
+  Raster sketch = raster;
+  sketch.texels_per_unit *= kSketchSide / std::sqrt(texels);
+  sketch.cell = 1;
+  sketch.gutter = 0;
+  plans = RankPlans(MakeCandidates(items, sketch), plans, kSketchSide * kSketchSide, 1);
+  plans.resize(std::min<size_t>(plans.size(), effort.semifinalists));
+  plans = RankPlans(MakeCandidates(items, raster), plans, texels, raster.cell);
+  plans.resize(std::min<size_t>(plans.size(), effort.finalists));
+  return plans;
 }
 
 // The largest density that fits one page: a page twice as high tells by how much a trial misses.
@@ -126,8 +139,7 @@ std::optional<Outcome> SearchPlans(std::span<const PackItem> items, Raster raste
   const int affordable = static_cast<int>(size_t(effort.plans) * 64 / std::max<size_t>(items.size(), 64));
   raster.tilts = affordable > 1 ? effort.tilts : 1;
   std::vector<Plan> plans = MakePlans(std::max(affordable, 1), free_shape && affordable > 1);
-  if (plans.size() > 1) plans = RankPlans(items, std::move(plans), raster, texels);
-  plans.resize(std::min<size_t>(plans.size(), effort.finalists));
+  if (plans.size() > 1) plans = BestPlans(items, std::move(plans), raster, texels, effort);
   std::optional<Outcome> best;
   for (const Plan& plan : plans) {
     auto outcome = SearchDensity(items, raster, GridOf(texels, plan.aspect, raster.cell), plan, effort.trials);
