@@ -18,7 +18,8 @@ constexpr int kBlock = 4;
 constexpr int kDefaultSide = 1024;
 constexpr int kMaxSide = 32768;
 constexpr int kMaxTrials = 40;
-constexpr int kSketchSide = 256;  // cells of the coarse pages on which plans are compared
+// Side of the coarse pages on which plans are compared: a quarter of the page's, within bounds [cells].
+constexpr double kSketchShare = 0.25, kLeastSketch = 48, kLargestSketch = 256;
 
 // How hard to look.
 struct Effort {
@@ -99,10 +100,11 @@ std::vector<Plan> BestPlans(std::span<const PackItem> items, std::vector<Plan> p
   raster.texels_per_unit =
       std::min(EstimateDensity(items, raster.gutter, 0.85 * texels), LargestUnclampedDensity(items, raster));
   Raster sketch = raster;
-  sketch.texels_per_unit *= kSketchSide / std::sqrt(texels);
+  const double side = std::clamp(kSketchShare * std::sqrt(texels), kLeastSketch, kLargestSketch);
+  sketch.texels_per_unit *= side / std::sqrt(texels);
   sketch.cell = 1;
   sketch.gutter = 0;
-  plans = RankPlans(MakeCandidates(items, sketch), plans, kSketchSide * kSketchSide, 1);
+  plans = RankPlans(MakeCandidates(items, sketch), plans, side * side, 1);
   plans.resize(std::min<size_t>(plans.size(), effort.semifinalists));
   plans = RankPlans(MakeCandidates(items, raster), plans, texels, raster.cell);
   plans.resize(std::min<size_t>(plans.size(), effort.finalists));
