@@ -104,7 +104,7 @@ void AddChartFlags(CLI::App& command, chart::ChartOptions& options) {
   command.add_option("--max-cost", options.maxCost, "Charts stop growing above this cost");
   command.add_option("--max-iterations", options.maxIterations, "Passes that straighten borders");
   command.add_flag("--use-input-mesh-uvs", options.useInputMeshUvs, "Keep the input's UV charts where valid");
-  command.add_flag("--fix-winding", options.fixWinding, "Turn faces so that neighbours agree");
+  command.add_flag("--fix-winding", options.fixWinding, "For compatibility: UVs always run counter-clockwise");
   command.add_option("--max-stretch", options.maxStretch, "Bound of a chart's Sander L2 stretch")
       ->check(CLI::Range(1.0001, 1e6));
 }

@@ -16,7 +16,7 @@ struct ChartOptions {
   float maxCost = 2;                   // charts stop growing where the weighted sum exceeds this
   uint32_t maxIterations = 2;          // passes that round charts and straighten their borders after growing
   bool useInputMeshUvs = false;        // keep the input's UV charts (rescaled to one density), generate where invalid
-  bool fixWinding = false;             // turn faces so that neighbours agree before charting
+  bool fixWinding = false;             // kept for compatibility: UVs always run counter-clockwise here
   float maxStretch = 1.004f;           // ours: bound of a chart's Sander L2 stretch; a chart above it is split
 };
 
