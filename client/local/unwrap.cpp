@@ -35,9 +35,7 @@ absl::Status WriteWhole(const std::filesystem::path& path, const std::string& te
 class Stopwatch {
  public:
   double CpuSeconds() const { return double(std::clock() - cpu_) / CLOCKS_PER_SEC; }
-  double WallSeconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_).count();
-  }
+  double WallSeconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_).count(); }
 
  private:
   std::clock_t cpu_ = std::clock();
@@ -52,7 +50,8 @@ nlohmann::json Report(const chart::Atlas& atlas, const Timings& timings) {
   size_t triangles = 0, charted = 0;
   for (const chart::Mesh& mesh : atlas.meshes) {
     triangles += mesh.faceState.size();
-    charted += static_cast<size_t>(std::count(mesh.faceState.begin(), mesh.faceState.end(), chart::FaceState::kCharted));
+    charted +=
+        static_cast<size_t>(std::count(mesh.faceState.begin(), mesh.faceState.end(), chart::FaceState::kCharted));
   }
   return {{"triangles", triangles},
           {"set_aside", triangles - charted},
@@ -72,9 +71,9 @@ void Print(const nlohmann::json& report, bool json) {
     std::cout << report.dump() << std::endl;
     return;
   }
-  std::cout << report["triangles"] << " triangles, " << report["charts"] << " charts on " << report["pages"] << " page(s) of "
-            << report["width"] << " x " << report["height"] << ", " << report["texels_per_unit"] << " texels per unit, "
-            << report["set_aside"] << " triangles without a chart" << std::endl;
+  std::cout << report["triangles"] << " triangles, " << report["charts"] << " charts on " << report["pages"]
+            << " page(s) of " << report["width"] << " x " << report["height"] << ", " << report["texels_per_unit"]
+            << " texels per unit, " << report["set_aside"] << " triangles without a chart" << std::endl;
 }
 
 absl::Status UnwrapObj(const UnwrapRequest& request) {

@@ -21,12 +21,12 @@ struct UnwrapRequest {
   bool json = false;
 };
 
-// Charts and packs the input, writes the output (whole or not at all), prints one line of statistics (one JSON object with
-// request.json) to stdout.
+// Charts and packs the input, writes the output (whole or not at all), prints one line of statistics (one JSON object
+// with request.json) to stdout.
 absl::Status Unwrap(const UnwrapRequest& request);
 
-// Adds `unwrap in -o out` with every option as a flag to a CLI11 program; `exit_code` is set when it has run (0, or 2 after
-// an error that is printed to stderr). `exit_code` must outlive the program's parsing.
+// Adds `unwrap in -o out` with every option as a flag to a CLI11 program; `exit_code` is set when it has run (0, or 2
+// after an error that is printed to stderr). `exit_code` must outlive the program's parsing.
 void RegisterUnwrap(CLI::App& program, int& exit_code);
 
 }  // namespace bakewell

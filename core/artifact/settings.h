@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/base/status.h"
 #include "core/scene/scene.h"
 
 namespace bakewell {
@@ -17,6 +18,7 @@ struct BakeSettings {
   UvMode uv = UvMode::kAuto;
   int resolution = 0;          // page side in texels; 0: scene.extras.lightmap, else from texels_per_metre
   float texels_per_metre = 0;  // 0: from resolution, else 8
+  float footprint = 0.5f;      // side of the square about a texel's centre that its value averages [texels], (0, 1]
   BackfaceMode backfaces = BackfaceMode::kReflect;
   Quality quality = Quality::kMedium;
   float target_error = 0;      // relative standard error at which a texel stops; 0: the quality's
@@ -28,5 +30,8 @@ struct BakeSettings {
   uint32_t seed = 0;
   std::optional<Environment> environment;  // replaces the scene's
 };
+
+// kInvalidArgument, naming the setting, its range and its value, where one is outside its range.
+absl::Status ValidateSettings(const BakeSettings& settings);
 
 }  // namespace bakewell

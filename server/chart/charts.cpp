@@ -19,7 +19,8 @@ absl::Status CheckIndices(std::span<const MeshDecl> meshes) {
   for (size_t m = 0; m < meshes.size(); ++m) {
     const MeshDecl& mesh = meshes[m];
     const std::string name = "mesh " + std::to_string(m);
-    if (mesh.indexData.size() % 3 != 0) return absl::InvalidArgumentError(name + ": index count is not a multiple of 3");
+    if (mesh.indexData.size() % 3 != 0)
+      return absl::InvalidArgumentError(name + ": index count is not a multiple of 3");
     if (!mesh.vertexUvData.empty() && mesh.vertexUvData.size() != mesh.vertexPositionData.size())
       return absl::InvalidArgumentError(name + ": as many UVs as positions are needed");
     if (!(mesh.density > 0)) return absl::InvalidArgumentError(name + ": density must be above 0");
@@ -57,7 +58,8 @@ double RectangleFill(const Surface& surface, std::span<const FlatChart> charts) 
   double area = 0, rectangles = 0;
   for (const FlatChart& chart : charts) {
     std::vector<Segment2> outline;
-    for (const BoundaryEdge& edge : BoundaryEdges(surface, chart)) outline.push_back({chart.uv[edge.a], chart.uv[edge.b]});
+    for (const BoundaryEdge& edge : BoundaryEdges(surface, chart))
+      outline.push_back({chart.uv[edge.a], chart.uv[edge.b]});
     for (const uint32_t f : chart.face) area += surface.area[f];
     const Vec2d size = SizeAlong(outline, LeastRectangleAxis(outline));
     rectangles += size.x * size.y;

@@ -1,8 +1,8 @@
 #include "server/chart/obj.h"
 
 #include <OpenMesh/Core/IO/IOManager.hh>
-#include <OpenMesh/Core/IO/reader/OBJReader.hh>
 #include <OpenMesh/Core/IO/importer/BaseImporter.hh>
+#include <OpenMesh/Core/IO/reader/OBJReader.hh>
 #include <cstdio>
 #include <fstream>
 
@@ -96,7 +96,8 @@ absl::StatusOr<ObjMesh> ReadObj(const std::filesystem::path& path) {
   OpenMesh::IO::Options options;
   if (!OpenMesh::IO::OBJReader().read(file, importer, options) || importer.mesh.index.empty())
     return absl::InvalidArgumentError(path.string() + ": not an OBJ file with faces");
-  if (importer.bad_index) return absl::InvalidArgumentError(path.string() + ": a face names a vertex that is not there");
+  if (importer.bad_index)
+    return absl::InvalidArgumentError(path.string() + ": a face names a vertex that is not there");
   return std::move(importer.mesh);
 }
 
@@ -106,7 +107,8 @@ std::string FormatObj(const ObjMesh& mesh, const Atlas& atlas) {
   Append(text, "# atlas %u %u\n", atlas.width, atlas.height);
   for (const Vec3f& p : mesh.position) Append(text, "v %.9g %.9g %.9g\n", p.x, p.y, p.z);
   for (const Vertex& v : charted.vertexArray)
-    Append(text, "vt %.17g %.17g\n", v.uv[0] / double(std::max(atlas.width, 1u)), v.uv[1] / double(std::max(atlas.height, 1u)));
+    Append(text, "vt %.17g %.17g\n", v.uv[0] / double(std::max(atlas.width, 1u)),
+           v.uv[1] / double(std::max(atlas.height, 1u)));
   for (size_t c = 0; c < charted.chartArray.size(); ++c) {
     Append(text, "g chart_%zu\n", c + 1000000 * size_t{charted.chartArray[c].atlasIndex});
     for (const uint32_t triangle : charted.chartArray[c].faceArray) AppendFace(text, mesh, charted, triangle);

@@ -10,8 +10,8 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 
 // The boundary vertex farthest from a vertex in space.
-uint32_t FarthestFrom(const Surface& surface, const FlatChart& chart,
-                      const std::vector<BoundaryEdge>& boundary, uint32_t from) {
+uint32_t FarthestFrom(const Surface& surface, const FlatChart& chart, const std::vector<BoundaryEdge>& boundary,
+                      uint32_t from) {
   uint32_t best = from;
   double farthest = 0;
   for (const auto& edge : boundary) {
@@ -22,8 +22,7 @@ uint32_t FarthestFrom(const Surface& surface, const FlatChart& chart,
 }
 
 // u of vertex v is unknown 2 v, v of it 2 v + 1. Area of the outline: half the sum over boundary edges of u x v.
-Entries ConformalEnergy(const Surface& surface, const FlatChart& chart,
-                        const std::vector<BoundaryEdge>& boundary) {
+Entries ConformalEnergy(const Surface& surface, const FlatChart& chart, const std::vector<BoundaryEdge>& boundary) {
   Entries entries;
   const std::vector<PlanarFace> faces = PlanarFaces(surface, chart);
   for (size_t i = 0; i < faces.size(); ++i)
@@ -66,7 +65,8 @@ Reduced Reduce(const Entries& entries, const std::vector<int>& number, const Eig
 bool MapConformally(const Surface& surface, FlatChart& chart) {
   const auto boundary = BoundaryEdges(surface, chart);
   if (boundary.empty()) return false;
-  const uint32_t a = FarthestFrom(surface, chart, boundary, boundary[0].a), b = FarthestFrom(surface, chart, boundary, a);
+  const uint32_t a = FarthestFrom(surface, chart, boundary, boundary[0].a),
+                 b = FarthestFrom(surface, chart, boundary, a);
   if (a == b) return false;
 
   // a lies at the origin, b on the u axis.

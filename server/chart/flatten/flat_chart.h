@@ -10,13 +10,13 @@
 
 namespace bakewell::chart {
 
-// A connected piece of a surface laid into the plane: n faces, v vertices of its own. A vertex whose faces the chart's border
-// parts into several fans is one local vertex per fan, so every local vertex has at most two border edges.
+// A connected piece of a surface laid into the plane: n faces, v vertices of its own. A vertex whose faces the chart's
+// border parts into several fans is one local vertex per fan, so every local vertex has at most two border edges.
 struct FlatChart {
-  std::vector<uint32_t> face;                  // n, faces of the Surface
+  std::vector<uint32_t> face;                   // n, faces of the Surface
   std::vector<std::array<uint32_t, 3>> corner;  // n, local vertices, counter-clockwise in the plane
-  std::vector<uint32_t> vertex;                // v, vertices of the Surface
-  std::vector<Vec2d> uv;                       // v, scaled units: the chart's area in the plane is its area in space
+  std::vector<uint32_t> vertex;                 // v, vertices of the Surface
+  std::vector<Vec2d> uv;                        // v, scaled units: the chart's area in the plane is its area in space
 };
 
 // The faces' own vertices, with no plane coordinates yet. O(n log n).

@@ -63,7 +63,8 @@ class Flattener {
     for (auto& part : parts) open_.push_back(std::move(part));
   }
 
-  // Peels faces in conflict off until what is left is free of it; what was peeled is charted anew. False: too much would go.
+  // Peels faces in conflict off until what is left is free of it; what was peeled is charted anew. False: too much
+  // would go.
   bool Accept(FlatChart chart) {
     const size_t whole = chart.face.size();
     std::vector<uint32_t> peeled;
@@ -85,8 +86,8 @@ class Flattener {
       if (!gone[i]) left.push_back(chart.face[i]);
     const auto parts = ConnectedParts(surface_, left);
     if (parts.empty()) return false;
-    const auto largest = std::max_element(parts.begin(), parts.end(),
-                                          [](const auto& a, const auto& b) { return a.size() < b.size(); });
+    const auto largest =
+        std::max_element(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
     // Parts keep the order of the chart's faces.
     std::vector<uint32_t> keep;
     for (uint32_t i = 0; i < chart.face.size(); ++i) {

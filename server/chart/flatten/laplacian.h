@@ -8,8 +8,8 @@
 
 namespace bakewell::chart {
 
-// A face of a chart laid into its own plane, and what its edges weigh: cotangent k is that of the angle opposite the edge from corner
-// k to corner k+1, halved (Pinkall & Polthier 1993).
+// A face of a chart laid into its own plane, and what its edges weigh: cotangent k is that of the angle opposite the
+// edge from corner k to corner k+1, halved (Pinkall & Polthier 1993).
 struct PlanarFace {
   std::array<Vec2d, 3> corner;
   std::array<double, 3> half_cotangent;

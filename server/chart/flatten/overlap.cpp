@@ -29,8 +29,8 @@ Box BoundsOf(std::span<const Vec2d> uv, const BoundaryEdge& e) {
 int SideOf(Vec2d a, Vec2d b, Vec2d p) {
   const Vec2d d = b - a, e = p - a;
   const double cross = Cross(d, e);
-  const double limit = kTouchShare * (std::abs(d.x) + std::abs(d.y)) *
-                       (std::abs(d.x) + std::abs(d.y) + std::abs(e.x) + std::abs(e.y));
+  const double limit =
+      kTouchShare * (std::abs(d.x) + std::abs(d.y)) * (std::abs(d.x) + std::abs(d.y) + std::abs(e.x) + std::abs(e.y));
   return std::abs(cross) <= limit ? 0 : cross > 0 ? 1 : -1;
 }
 
@@ -141,8 +141,8 @@ std::vector<int> LoopTurns(std::span<const BoundaryEdge> boundary, const std::ve
   return turns;
 }
 
-// Inner vertices must have faces all round once, border vertices not more than all round. Otherwise: an inner vertex gives up all its
-// faces; a border vertex the face of the least angle there that is enough.
+// Inner vertices must have faces all round once, border vertices not more than all round. Otherwise: an inner vertex
+// gives up all its faces; a border vertex the face of the least angle there that is enough.
 void CollectCrowdedVertices(const FlatChart& chart, std::span<const BoundaryEdge> boundary,
                             const std::vector<double>& angle, std::vector<uint32_t>& faces) {
   std::vector<bool> inner(angle.size(), true);

@@ -23,8 +23,8 @@ Matrix Laplacian(const FlatChart& chart, const std::vector<PlanarFace>& faces) {
   entries.reserve(9 * faces.size() + 1);
   for (size_t i = 0; i < faces.size(); ++i)
     for (int k = 0; k < 3; ++k)
-      AddSquaredDifference(entries, static_cast<int>(chart.corner[i][k]), static_cast<int>(chart.corner[i][(k + 1) % 3]),
-                           faces[i].half_cotangent[k]);
+      AddSquaredDifference(entries, static_cast<int>(chart.corner[i][k]),
+                           static_cast<int>(chart.corner[i][(k + 1) % 3]), faces[i].half_cotangent[k]);
   // The energy does not see a translation: one vertex is tied down.
   entries.emplace_back(0, 0, 1.0);
   const int n = static_cast<int>(chart.vertex.size());
@@ -75,8 +75,8 @@ double CollapseTime(Vec2d u, Vec2d v, Vec2d du, Vec2d dv) {
 double SafeStep(const FlatChart& chart, const std::vector<Vec2d>& move) {
   double step = INFINITY;
   for (const auto& [a, b, c] : chart.corner)
-    step = std::min(step, CollapseTime(chart.uv[b] - chart.uv[a], chart.uv[c] - chart.uv[a], move[b] - move[a],
-                                       move[c] - move[a]));
+    step = std::min(
+        step, CollapseTime(chart.uv[b] - chart.uv[a], chart.uv[c] - chart.uv[a], move[b] - move[a], move[c] - move[a]));
   return std::min(1.0, kSafeShare * step);
 }
 
@@ -93,8 +93,7 @@ void MakeRigid(const Surface& surface, FlatChart& chart) {
     const Points rhs = RotatedEdges(chart, faces);
     const Points target = solver.solve(rhs);
     if (!target.allFinite()) break;
-    for (size_t v = 0; v < move.size(); ++v)
-      move[v] = Vec2d{target(v, 0), target(v, 1)} - chart.uv[v];
+    for (size_t v = 0; v < move.size(); ++v) move[v] = Vec2d{target(v, 0), target(v, 1)} - chart.uv[v];
     const double share = SafeStep(chart, move);
     for (size_t v = 0; v < move.size(); ++v) chart.uv[v] = chart.uv[v] + move[v] * share;
     const double now = MeasureStretch(surface, chart).l2;

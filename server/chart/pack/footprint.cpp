@@ -56,8 +56,7 @@ void FillInside(Bitmap& bitmap, std::span<const Segment2> outline) {
 
 Bitmap RasterizeCover(std::span<const Segment2> outline) {
   Vec2d high{0, 0};
-  for (const auto& [a, b] : outline)
-    high = {std::max({high.x, a.x, b.x}), std::max({high.y, a.y, b.y})};
+  for (const auto& [a, b] : outline) high = {std::max({high.x, a.x, b.x}), std::max({high.y, a.y, b.y})};
   Bitmap bitmap(std::max(EndTouched(high.x), 1), std::max(EndTouched(high.y), 1));
   for (const auto& [a, b] : outline) TraceSegment(bitmap, a, b);
   FillInside(bitmap, outline);

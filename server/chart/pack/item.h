@@ -18,8 +18,8 @@ struct PackItem {
   bool rectangle = false;  // its outline is its bounding box
 };
 
-// From input units to texels on a page: tilt, scale, quarter turns, move. A quarter turn is about the footprint's corner and takes
-// (x, y) to (height - y, x).
+// From input units to texels on a page: tilt, scale, quarter turns, move. A quarter turn is about the footprint's
+// corner and takes (x, y) to (height - y, x).
 struct Placement {
   int page = 0;
   Vec2d axis{1, 0};    // unit, the chart's direction that becomes x
@@ -47,11 +47,11 @@ struct Candidate {
 
 struct Raster {
   double texels_per_unit = 1;
-  int cell = 1;          // 4: no two charts may share a 4x4 block
-  int gutter = 2;        // empty texels between charts
-  int max_size = 1024;   // texels; longer charts are scaled down
-  bool turn = true;      // quarter turns
-  int tilts = 1;         // directions within a quarter turn for charts that are not rectangles
+  int cell = 1;         // 4: no two charts may share a 4x4 block
+  int gutter = 2;       // empty texels between charts
+  int max_size = 1024;  // texels; longer charts are scaled down
+  bool turn = true;     // quarter turns
+  int tilts = 1;        // directions within a quarter turn for charts that are not rectangles
 };
 
 Candidate MakeCandidate(const PackItem& item, const Raster& raster);

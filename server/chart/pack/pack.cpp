@@ -152,8 +152,12 @@ std::optional<Outcome> SearchPlans(std::span<const PackItem> items, Raster raste
 
 PackResult ToResult(Outcome outcome, int width, int height) {
   const int cell = outcome.raster.cell;
-  PackResult result{width, height, static_cast<int>(outcome.trial.cells.size()), outcome.raster.texels_per_unit,
-                    std::move(outcome.trial.placement), {}};
+  PackResult result{width,
+                    height,
+                    static_cast<int>(outcome.trial.cells.size()),
+                    outcome.raster.texels_per_unit,
+                    std::move(outcome.trial.placement),
+                    {}};
   for (Placement& placement : result.placement) placement.corner = placement.corner * double(cell);
   const double all = double(width) * height / (cell * cell);
   for (const int64_t cells : outcome.trial.cells) result.utilization.push_back(double(cells) / all);
@@ -172,7 +176,8 @@ PackResult PackOnePage(std::span<const PackItem> items, const Raster& raster) {
   double demand = 0, longest = 1;
   for (const PackItem& item : items) {
     demand += Demand(item, raster.texels_per_unit, raster.gutter);
-    longest = std::max(longest, std::hypot(item.size.x, item.size.y) * raster.texels_per_unit * item.density + 2 * kBlock);
+    longest =
+        std::max(longest, std::hypot(item.size.x, item.size.y) * raster.texels_per_unit * item.density + 2 * kBlock);
   }
   const double side = std::min<double>(kMaxSide, std::max(std::sqrt(demand * 1.1), longest));
   const int width = RoundUp(static_cast<int>(side), kBlock) / raster.cell;
@@ -203,7 +208,8 @@ PackResult Pack(std::span<const PackItem> items, const PackOptions& options) {
   const bool free_side = options.resolution == 0;
   const int side = free_side ? kDefaultSide : static_cast<int>(options.resolution);
   if (options.texelsPerUnit > 0)
-    return free_side ? PackOnePage(items, RasterFor(options, kMaxSide)) : PackPages(items, RasterFor(options, side), side);
+    return free_side ? PackOnePage(items, RasterFor(options, kMaxSide))
+                     : PackPages(items, RasterFor(options, side), side);
 
   const double texels = double(side) * side;
   Raster raster = RasterFor(options, side);

@@ -23,7 +23,7 @@ struct Order {
 
 // One attempt to place every chart.
 struct Trial {
-  bool complete = true;  // false: some chart found no place, the rest of the fields are of no use
+  bool complete = true;                 // false: some chart found no place, the rest of the fields are of no use
   int used_width = 0, used_height = 0;  // cells, of the fullest page
   std::vector<Placement> placement;     // one per chart
   std::vector<int64_t> cells;           // taken, one per page

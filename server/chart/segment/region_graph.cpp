@@ -14,8 +14,7 @@ uint64_t PairKey(uint32_t a, uint32_t b) { return (uint64_t{std::min(a, b)} << 3
 
 }  // namespace
 
-LinkTable::LinkTable(size_t expected)
-    : key_(std::bit_ceil(2 * expected + 2), kEmpty), link_(key_.size(), kNone) {}
+LinkTable::LinkTable(size_t expected) : key_(std::bit_ceil(2 * expected + 2), kEmpty), link_(key_.size(), kNone) {}
 
 size_t LinkTable::SlotOf(uint64_t key) const {
   const size_t mask = key_.size() - 1;

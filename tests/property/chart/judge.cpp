@@ -55,7 +55,8 @@ class Judge {
     for (size_t i = 0; i < mesh_.indexArray.size(); ++i) {
       const Vertex& v = mesh_.vertexArray.at(mesh_.indexArray[i]);
       if (v.xref != decl_.indexData[i]) return "xref of corner " + std::to_string(i);
-      const bool inside = v.uv[0] >= 0 && v.uv[1] >= 0 && v.uv[0] <= float(atlas_.width) && v.uv[1] <= float(atlas_.height);
+      const bool inside =
+          v.uv[0] >= 0 && v.uv[1] >= 0 && v.uv[0] <= float(atlas_.width) && v.uv[1] <= float(atlas_.height);
       if (!inside) return "UV of corner " + std::to_string(i) + " is outside the page";
     }
     return "";
@@ -74,7 +75,8 @@ class Judge {
   std::string Draw(int32_t chart, uint32_t t) {
     Triangle triangle;
     for (int k = 0; k < 3; ++k)
-      triangle[k] = {std::llround(double(Corner(t, k).uv[0]) * kGrid), std::llround(double(Corner(t, k).uv[1]) * kGrid)};
+      triangle[k] = {std::llround(double(Corner(t, k).uv[0]) * kGrid),
+                     std::llround(double(Corner(t, k).uv[1]) * kGrid)};
     const Vertex &a = Corner(t, 0), &b = Corner(t, 1), &c = Corner(t, 2);
     const double area = (double(b.uv[0]) - a.uv[0]) * (double(c.uv[1]) - a.uv[1]) -
                         (double(b.uv[1]) - a.uv[1]) * (double(c.uv[0]) - a.uv[0]);
@@ -87,8 +89,9 @@ class Judge {
       for (int x = int(x0 / kGrid); x < std::min<int64_t>(x1 / kGrid + 1, atlas_.width); ++x) {
         if (!CoversCentre(triangle, x, y)) continue;
         int32_t& texel = owner[size_t{atlas_.width} * y + x];
-        if (texel >= 0) return "texel " + std::to_string(x) + "," + std::to_string(y) + " is covered by charts " +
-                               std::to_string(texel) + " and " + std::to_string(chart);
+        if (texel >= 0)
+          return "texel " + std::to_string(x) + "," + std::to_string(y) + " is covered by charts " +
+                 std::to_string(texel) + " and " + std::to_string(chart);
         texel = chart;
       }
     return "";
@@ -104,7 +107,8 @@ class Judge {
             for (int dx = -padding_; dx <= padding_; ++dx) {
               if (x + dx < 0 || x + dx >= width) continue;
               const int32_t other = page.owner[size_t(width) * (y + dy) + x + dx];
-              if (other >= 0 && other != chart) return "charts " + std::to_string(chart) + " and " + std::to_string(other) + " are too close";
+              if (other >= 0 && other != chart)
+                return "charts " + std::to_string(chart) + " and " + std::to_string(other) + " are too close";
             }
         }
     return "";

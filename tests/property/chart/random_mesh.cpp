@@ -38,11 +38,13 @@ void AddSoup(Random& random, RandomMesh& mesh) {
 void AddGrid(Random& random, RandomMesh& mesh) {
   const uint32_t columns = 2 + random.Below(14), rows = 2 + random.Below(14);
   const uint32_t base = static_cast<uint32_t>(mesh.position.size());
-  const float bend = random.Chance(0.5f) ? 6.2831853f * random.Unit() : 0, rough = random.Chance(0.5f) ? 0.2f * random.Unit() : 0;
+  const float bend = random.Chance(0.5f) ? 6.2831853f * random.Unit() : 0,
+              rough = random.Chance(0.5f) ? 0.2f * random.Unit() : 0;
   const bool tube = random.Chance(0.3f);
   for (uint32_t y = 0; y < rows; ++y)
     for (uint32_t x = 0; x < columns; ++x) {
-      const float u = static_cast<float>(x) / static_cast<float>(columns), v = static_cast<float>(y) / static_cast<float>(rows);
+      const float u = static_cast<float>(x) / static_cast<float>(columns),
+                  v = static_cast<float>(y) / static_cast<float>(rows);
       const Vec3f p{std::cos(bend * u) * (1 + v), std::sin(bend * u) * (1 + v) + (bend == 0 ? u : 0), tube ? v * v : v};
       mesh.position.push_back(p + RandomPoint(random) * rough);
     }
@@ -99,10 +101,17 @@ RandomMesh MakeRandomMesh(uint64_t key) {
   const uint32_t parts = 1 + random.Below(3);
   for (uint32_t i = 0; i < parts; ++i) {
     switch (random.Below(4)) {
-      case 0: AddSoup(random, mesh); break;
-      case 1: AddGrid(random, mesh); break;
-      case 2: AddFan(random, mesh); break;
-      default: AddSlivers(random, mesh);
+      case 0:
+        AddSoup(random, mesh);
+        break;
+      case 1:
+        AddGrid(random, mesh);
+        break;
+      case 2:
+        AddFan(random, mesh);
+        break;
+      default:
+        AddSlivers(random, mesh);
     }
   }
   if (random.Chance(0.5f)) Damage(random, mesh);
