@@ -10,8 +10,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "client/gltf/level.h"
+#include "core/image/png.h"
 #include "server/chart/atlas.h"
+#include "server/chart/generate.h"
 #include "server/chart/obj.h"
+#include "server/chart/picture.h"
 
 namespace bakewell {
 namespace {
@@ -76,18 +80,63 @@ void Print(const nlohmann::json& report, bool json) {
             << " texels per unit, " << report["set_aside"] << " triangles without a chart" << std::endl;
 }
 
+// Charts and packs, and says how long each took.
+absl::StatusOr<chart::Atlas> MakeAtlas(std::span<const chart::MeshDecl> meshes, const UnwrapRequest& request,
+                                       Timings& timings) {
+  const Stopwatch charting;
+  BAKEWELL_ASSIGN_OR_RETURN(const auto charts, chart::ComputeCharts(meshes, request.chart));
+  timings.chart_cpu_s = charting.CpuSeconds();
+  const Stopwatch packing;
+  BAKEWELL_ASSIGN_OR_RETURN(chart::Atlas atlas, chart::PackCharts(meshes, charts, request.pack));
+  timings.pack_cpu_s = packing.CpuSeconds();
+  timings.wall_s = charting.WallSeconds();
+  return atlas;
+}
+
+// name.png, or name-0.png, name-1.png, ... for several pages.
+absl::Status WritePictures(const std::filesystem::path& path, const AtlasLayout& layout) {
+  for (int page = 0; page < static_cast<int>(layout.pages.size()); ++page) {
+    std::filesystem::path file = path;
+    if (layout.pages.size() > 1)
+      file.replace_filename(path.stem().string() + "-" + std::to_string(page) + path.extension().string());
+    const PageSize size = layout.pages[page];
+    BAKEWELL_RETURN_IF_ERROR(WritePng(file, size.width, size.height, DrawCharts(layout, page)));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status UnwrapObj(const UnwrapRequest& request) {
   BAKEWELL_ASSIGN_OR_RETURN(const chart::ObjMesh mesh, chart::ReadObj(request.input));
   const chart::MeshDecl decl{.vertexPositionData = mesh.position, .vertexUvData = {}, .indexData = mesh.index};
   Timings timings;
-  const Stopwatch all, charting;
-  BAKEWELL_ASSIGN_OR_RETURN(const auto charts, chart::ComputeCharts(std::span(&decl, 1), request.chart));
-  timings.chart_cpu_s = charting.CpuSeconds();
-  const Stopwatch packing;
-  BAKEWELL_ASSIGN_OR_RETURN(const chart::Atlas atlas, chart::PackCharts(std::span(&decl, 1), charts, request.pack));
-  timings.pack_cpu_s = packing.CpuSeconds();
-  timings.wall_s = all.WallSeconds();
+  BAKEWELL_ASSIGN_OR_RETURN(const chart::Atlas atlas, MakeAtlas(std::span(&decl, 1), request, timings));
   BAKEWELL_RETURN_IF_ERROR(WriteWhole(request.output, chart::FormatObj(mesh, atlas)));
+  const int first = 0;
+  if (!request.picture.empty())
+    BAKEWELL_RETURN_IF_ERROR(WritePictures(request.picture, ToLayout(atlas, std::span(&first, 1))));
+  Print(Report(atlas, timings), request.json);
+  return absl::OkStatus();
+}
+
+absl::Status UnwrapLevel(const UnwrapRequest& request) {
+  BAKEWELL_ASSIGN_OR_RETURN(const LoadedLevel level, LoadLevel(request.input));
+  std::vector<chart::MeshDecl> meshes;
+  std::vector<int> mesh_of_object;
+  for (const Object& object : level.scene.objects) {
+    mesh_of_object.push_back(object.lightmapped ? static_cast<int>(meshes.size()) : -1);
+    if (!object.lightmapped) continue;
+    meshes.push_back({.vertexPositionData = object.position,
+                      .vertexUvData = object.uv1,
+                      .indexData = object.index,
+                      .density = object.density});
+  }
+  Timings timings;
+  BAKEWELL_ASSIGN_OR_RETURN(const chart::Atlas atlas, MakeAtlas(meshes, request, timings));
+  const AtlasLayout layout = ToLayout(atlas, mesh_of_object);
+  const std::vector<LightmapFiles> no_files(layout.pages.size());
+  BAKEWELL_RETURN_IF_ERROR(WriteLevel(request.input, level, layout, no_files, request.output));
+  if (!request.picture.empty()) BAKEWELL_RETURN_IF_ERROR(WritePictures(request.picture, layout));
+  for (const std::string& warning : level.warnings) std::cerr << "warning: " << warning << std::endl;
   Print(Report(atlas, timings), request.json);
   return absl::OkStatus();
 }
@@ -125,6 +174,8 @@ void AddPackFlags(CLI::App& command, chart::PackOptions& options) {
 
 absl::Status Unwrap(const UnwrapRequest& request) {
   if (request.input.extension() == ".obj" && request.output.extension() == ".obj") return UnwrapObj(request);
+  const bool level_in = request.input.extension() == ".glb" || request.input.extension() == ".gltf";
+  if (level_in && request.output.extension() == ".glb") return UnwrapLevel(request);
   return absl::InvalidArgumentError(request.input.string() + " -> " + request.output.string() +
                                     ": both must be .obj or both .glb");
 }

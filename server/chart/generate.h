@@ -3,6 +3,7 @@
 #include "core/atlas/layout.h"
 #include "core/base/status.h"
 #include "core/scene/scene.h"
+#include "server/chart/atlas.h"
 #include "server/chart/options.h"
 
 namespace bakewell {
@@ -20,5 +21,9 @@ struct GenerateOptions {
 // that are not lightmapped get empty ObjectCharts; degenerate and non-finite triangles get kNoChart and UVs inside a
 // page. Pages are multiples of 4 texels. Same layout for any number of threads. kInvalidArgument names the object.
 absl::StatusOr<AtlasLayout> GenerateCharts(const Scene& scene, const GenerateOptions& options);
+
+// The charts of an atlas as a layout. mesh_of_object: one entry per layout object, the atlas' mesh or -1 (empty
+// ObjectCharts).
+AtlasLayout ToLayout(const chart::Atlas& atlas, std::span<const int> mesh_of_object);
 
 }  // namespace bakewell
