@@ -73,6 +73,7 @@ std::vector<FlatChart> GrowCharts(const Surface& surface, std::span<const uint8_
   const std::vector<uint32_t> grown = Segment(surface, options, seam);
   std::vector<uint32_t> relaxed = grown;
   for (uint32_t i = 0; i < options.maxIterations; ++i) relaxed = RelaxOnce(surface, relaxed);
+  if (options.maxIterations > 0) CutTeeth(surface, relaxed);
   std::vector<FlatChart> charts = FlattenAll(surface, relaxed, options);
   if (relaxed == grown || surface.FaceCount() > kMaxComparedFaces) return charts;
   std::vector<FlatChart> plain = FlattenAll(surface, grown, options);

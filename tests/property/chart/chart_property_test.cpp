@@ -43,6 +43,17 @@ TEST(ChartProperty, AnyMeshGivesAValidAtlasWithinItsTime) {
   });
 }
 
+// Triangles thinner than a float lightmap resolves came out turned over.
+TEST(ChartProperty, SliversThatOnceFlippedByRoundingDoNot) {
+  for (const uint64_t key : {3252, 7111}) {
+    const RandomMesh mesh = MakeRandomMesh(key);
+    const MeshDecl decl{.vertexPositionData = mesh.position, .vertexUvData = {}, .indexData = mesh.index};
+    const auto atlas = Generate(std::span(&decl, 1), {}, OptionsFor(key));
+    ASSERT_TRUE(atlas.ok());
+    EXPECT_EQ(FindFault(decl, *atlas, OptionsFor(key).padding), "") << key;
+  }
+}
+
 // The judge itself: what it must see.
 TEST(ChartJudge, SeesMovedFlippedAndDoublyMappedTriangles) {
   const std::vector<Vec3f> position{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}};
