@@ -159,7 +159,9 @@ class TileGatherer {
     for (size_t i = 0; i < work_.size(); ++i) {
       const Work& work = work_[i];
       const float irradiance = Luminance(work.direct.Irradiance() + work.indirect.Irradiance());
-      const float scale = options_.target_error * std::max(irradiance, options_.floor_share * options_.mean_irradiance);
+      // Between equal absolute and equal relative errors: what matters to the root mean square and to the eye.
+      const float mean = options_.mean_irradiance;
+      const float scale = options_.target_error * std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
       const float budget = 0.5f * scale * scale;
       active[i] = {work.direct_active &&
                        PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,

@@ -13,9 +13,8 @@ namespace bakewell {
 struct GatherOptions {
   int min_samples = 16;  // powers of two, at least 8
   int max_samples = 1024;
-  float target_error =
-      0;  // standard error over the larger of the texel's irradiance and floor_share of the mean; 0: never
-  float floor_share = 0.5f;
+  float target_error = 0;  // standard error over sqrt(mean * max(irradiance, floor_share * mean)); 0: never stops
+  float floor_share = 0.25f;
   float mean_irradiance = 0;  // luminance, of the whole bake, as the photons saw it [W m^-2]
   uint32_t seed = 0;
 };

@@ -40,31 +40,82 @@ void TexelSampler::AddFragment(const World& world, const AtlasLayout& layout, co
   const double area = std::fabs(polygon.SignedArea());
   if (polygon.count < 3 || area <= 0) return;
   const PageToWorld map = MapOf(t, corners);
-  const SurfacePoint point = world.PointAt(fragment.triangle, 0, 0, false);
-  sides_.push_back({FrameFromHint(t.normal, ToFloat(NormalizeOrZero(map.per_x))), point.offset});
-  radius_ = std::max(radius_,
-                     static_cast<float>(0.5 * std::max(Length(map.per_x + map.per_y), Length(map.per_x - map.per_y))));
-  const auto add = [&](Vec2d a, Vec2d b, Vec2d c, bool whole, double share) {
+  AddSide(world, fragment.triangle, map.per_x, map.per_y);
+  const auto add = [&](Vec2d a, Vec2d b, Vec2d c, Shape shape, double share) {
     const float before = parts_.empty() ? 0.0f : parts_.back().cdf;
     const Vec3d p = map.At(a);
     parts_.push_back({ToFloat(p), ToFloat(map.At(b) - p), ToFloat(map.At(c) - p), ToUnit(a, texel),
-                      ToUnit(b, texel) - ToUnit(a, texel), ToUnit(c, texel) - ToUnit(a, texel), whole,
+                      ToUnit(b, texel) - ToUnit(a, texel), ToUnit(c, texel) - ToUnit(a, texel), shape,
                       static_cast<uint16_t>(sides_.size() - 1), before + static_cast<float>(share)});
   };
   if (area > window.side * window.side * (1 - 1e-6)) {
-    return add(window.corner, window.corner + Vec2d{window.side, 0}, window.corner + Vec2d{0, window.side}, true, area);
+    return add(window.corner, window.corner + Vec2d{window.side, 0}, window.corner + Vec2d{0, window.side},
+               Shape::kSquare, area);
   }
   for (int i = 1; i + 1 < polygon.count; ++i) {
     const Vec2d a = polygon.corner[0], b = polygon.corner[i], c = polygon.corner[i + 1];
-    add(a, b, c, false, 0.5 * std::fabs(Cross(b - a, c - a)));
+    add(a, b, c, Shape::kTriangle, 0.5 * std::fabs(Cross(b - a, c - a)));
   }
+}
+
+void TexelSampler::AddSide(const World& world, uint32_t triangle, Vec3d per_x, Vec3d per_y) {
+  const SurfacePoint point = world.PointAt(triangle, 0, 0, false);
+  sides_.push_back({FrameFromHint(point.normal, ToFloat(NormalizeOrZero(per_x))), point.offset});
+  radius_ = std::max(radius_, static_cast<float>(0.5 * std::max(Length(per_x + per_y), Length(per_x - per_y))));
+}
+
+namespace {
+
+constexpr double kMirroredShare = 0.25;  // of the footprint that the triangle under the centre must hold
+
+// x in [0, max], reflected at both ends as often as needed.
+float Mirror(float x, float max) {
+  if (!(max > 0)) return 0;
+  const float period = x / max - 2 * std::floor(0.5f * x / max);
+  return (period > 1 ? 2 - period : period) * max;
+}
+
+}  // namespace
+
+bool TexelSampler::AddMirrored(const World& world, const AtlasLayout& layout, const TexelFragment& fragment,
+                               const Window& window, Vec2d texel) {
+  const Triangle& t = world.triangles()[fragment.triangle];
+  const auto c = TexelCorners(world, layout, fragment.triangle);
+  const Vec2d a = c[0] - c[2], b = c[1] - c[2], to_center = texel + Vec2d{0.5, 0.5} - c[2];
+  const double det = Cross(a, b);
+  if (det == 0) return false;
+  const Vec2d center{Cross(to_center, b) / det, Cross(a, to_center) / det};
+  if (center.x < 0 || center.y < 0 || center.x + center.y > 1) return false;
+  const ConvexPolygon inside = ClipToSquare({3, {c[0], c[1], c[2]}}, window.corner, window.side);
+  const double share = std::fabs(inside.SignedArea()) / (window.side * window.side);
+  if (share < kMirroredShare) return false;
+  if (share > 1 - 1e-6) {
+    AddFragment(world, layout, fragment, window, texel);
+    return true;
+  }
+  const PageToWorld map = MapOf(t, c);
+  AddSide(world, fragment.triangle, map.per_x, map.per_y);
+  const auto narrow = [](double x, double y) { return Vec2f{static_cast<float>(x), static_cast<float>(y)}; };
+  Part part{
+      t.p0 + t.e2, -t.e2, t.e1 - t.e2, ToUnit(c[2], texel), ToUnit(c[0], c[2]), ToUnit(c[1], c[2]), Shape::kMirrored,
+      0,           1};
+  part.center = narrow(center.x, center.y);
+  part.dx = narrow(window.side * b.y / det, -window.side * a.y / det);
+  part.dy = narrow(-window.side * b.x / det, window.side * a.x / det);
+  parts_.push_back(part);
+  return true;
 }
 
 TexelSampler::TexelSampler(const World& world, const AtlasLayout& layout, const TexelMap& map, const Texel& texel) {
   const Vec2d corner{static_cast<double>(texel.x), static_cast<double>(texel.y)};
   const double inset = 0.5 - 0.5 * static_cast<double>(map.footprint);
-  for (const Window& window : {Window{corner + Vec2d{inset, inset}, map.footprint}, Window{corner, 1}}) {
-    for (uint32_t f = texel.fragment_begin; f < texel.fragment_end; ++f) {
+  const Window footprint{corner + Vec2d{inset, inset}, map.footprint};
+  for (uint32_t f = texel.fragment_begin; f < texel.fragment_end && parts_.empty(); ++f) {
+    AddMirrored(world, layout, map.fragments[f], footprint, corner);
+  }
+  const bool mirrored = !parts_.empty();
+  for (const Window& window : {footprint, Window{corner, 1}}) {
+    for (uint32_t f = texel.fragment_begin; f < texel.fragment_end && !mirrored; ++f) {
       AddFragment(world, layout, map.fragments[f], window, corner);
     }
     if (!parts_.empty()) break;
@@ -90,7 +141,12 @@ TexelSampler::Place TexelSampler::Find(Vec2f u) const {
   const float begin = k == 0 ? 0 : parts_[k - 1].cdf;
   const float width = parts_[k].cdf - begin;
   const Vec2f within{width > 0 ? std::clamp((u.x - begin) / width, 0.0f, 0x1.fffffep-1f) : 0.5f, u.y};
-  return {&parts_[k], parts_[k].whole ? within : TriangleFromSquare(within)};
+  const Part& part = parts_[k];
+  if (part.shape == Shape::kSquare) return {&part, within};
+  if (part.shape == Shape::kTriangle) return {&part, TriangleFromSquare(within)};
+  const Vec2f b = part.center + part.dx * (within.x - 0.5f) + part.dy * (within.y - 0.5f);
+  const float first = Mirror(b.x, 1);
+  return {&part, {first, Mirror(b.y, 1 - first)}};
 }
 
 int TexelSampler::BitAt(Vec2f u) const { return MaskBit(Find(u)); }

@@ -13,13 +13,15 @@ struct TexelPoint {
   bool valid = true;  // false inside other geometry: the sample does not count
 };
 
-// Draws points uniformly over the covered part of one texel's footprint (the square of side TexelMap::footprint about
-// its centre), or over all of the texel that is covered where the footprint holds no surface.
+// Draws points over the footprint of one texel: the square of side TexelMap::footprint about its centre. Where a
+// triangle lies under the centre and holds a good part of the footprint, what leaves that triangle is mirrored back
+// into it: one normal, and the rule of the reference. Otherwise the footprint's (or, where that is empty, the texel's)
+// covered part is drawn from uniformly.
 class TexelSampler {
  public:
   TexelSampler(const World& world, const AtlasLayout& layout, const TexelMap& map, const Texel& texel);
 
-  // Pdf 1/(covered area of the footprint). Points in the parts that `valid_mask` rules out come back with valid ==
+  // Points in the parts that `valid_mask` rules out come back with valid ==
   // false.
   TexelPoint At(Vec2f u) const;
   // The bit of valid_mask that decides about At(u).
@@ -34,13 +36,15 @@ class TexelSampler {
   float radius() const { return radius_; }
 
  private:
-  // A parallelogram (whole texel) or a triangle of a clipped polygon's fan.
+  enum class Shape : uint8_t { kSquare, kTriangle, kMirrored };
+  // A parallelogram (the whole footprint), a triangle of a clipped polygon's fan, or the triangle under the centre.
   struct Part {
     Vec3f p0, e1, e2;   // [m]
     Vec2f uv0, d1, d2;  // in the texel's square, [0,1]
-    bool whole = false;
-    uint16_t side = 0;  // index into sides_
-    float cdf = 0;      // share of the coverage up to and with this part
+    Shape shape = Shape::kTriangle;
+    uint16_t side = 0;           // index into sides_
+    float cdf = 0;               // share of the coverage up to and with this part
+    Vec2f center{}, dx{}, dy{};  // mirrored: barycentrics of the centre, and across the footprint
   };
   struct Side {
     Frame frame;
@@ -58,6 +62,10 @@ class TexelSampler {
   };
   void AddFragment(const World& world, const AtlasLayout& layout, const TexelFragment& fragment, const Window& window,
                    Vec2d texel);
+
+  bool AddMirrored(const World& world, const AtlasLayout& layout, const TexelFragment& fragment, const Window& window,
+                   Vec2d texel);
+  void AddSide(const World& world, uint32_t triangle, Vec3d per_x, Vec3d per_y);
 
   std::vector<Part> parts_;
   std::vector<Side> sides_;
