@@ -35,6 +35,20 @@ ObjectCharts ToObjectCharts(const chart::Mesh& mesh, int32_t first_chart) {
   return charts;
 }
 
+absl::Status ApplyDensities(const std::vector<float>& factor, std::vector<chart::MeshCharts>& charts) {
+  if (factor.empty()) return absl::OkStatus();
+  size_t next = 0;
+  for (chart::MeshCharts& mesh : charts)
+    for (float& density : mesh.density) {
+      if (next >= factor.size() || !(factor[next] > 0))
+        return absl::InvalidArgumentError("chart_density: chart " + std::to_string(next) + " needs a factor above 0");
+      density *= factor[next++];
+    }
+  if (next == factor.size()) return absl::OkStatus();
+  return absl::InvalidArgumentError("chart_density has " + std::to_string(factor.size()) + " factors for " +
+                                    std::to_string(next) + " charts");
+}
+
 // Lightmapped objects are the atlas' meshes, in order.
 std::vector<int> MeshOfObject(const Scene& scene) {
   std::vector<int> meshes;
@@ -65,7 +79,9 @@ absl::StatusOr<AtlasLayout> GenerateCharts(const Scene& scene, const GenerateOpt
   chart::PackOptions pack = options.pack;
   pack.resolution = static_cast<uint32_t>(options.resolution > 0 ? options.resolution : options.max_resolution);
   pack.texelsPerUnit = options.texels_per_metre;
-  BAKEWELL_ASSIGN_OR_RETURN(const chart::Atlas atlas, chart::Generate(meshes, options.chart, pack));
+  BAKEWELL_ASSIGN_OR_RETURN(std::vector<chart::MeshCharts> charts, chart::ComputeCharts(meshes, options.chart));
+  BAKEWELL_RETURN_IF_ERROR(ApplyDensities(options.chart_density, charts));
+  BAKEWELL_ASSIGN_OR_RETURN(const chart::Atlas atlas, chart::PackCharts(meshes, charts, pack));
   return ToLayout(atlas, MeshOfObject(scene));
 }
 

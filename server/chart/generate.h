@@ -1,5 +1,8 @@
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "core/atlas/layout.h"
 #include "core/base/status.h"
 #include "core/scene/scene.h"
@@ -13,7 +16,10 @@ struct GenerateOptions {
   int resolution = 0;          // page side in texels; 0: max_resolution
   float texels_per_metre = 0;  // 0: the largest density at which everything fits one page of `resolution`
   int max_resolution = 1024;   // page side where texels_per_metre decides the number of pages
-  chart::ChartOptions chart;
+  // Factor on the density of each chart, on top of Object::density: empty, or one per AtlasLayout::charts that the same
+  // scene and `chart` gave before (their numbering does not depend on densities), as chart::DensityFactors makes them.
+  std::vector<float> chart_density = {};
+  chart::ChartOptions chart = {};
   chart::PackOptions pack{.blockAlign = true};  // resolution and texelsPerUnit are overwritten from above
 };
 

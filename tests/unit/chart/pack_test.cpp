@@ -29,7 +29,7 @@ TEST(ChartFootprint, CoversEveryTexelThatASampleHits) {
   for (int y = 0; y < cover.height() * samples; ++y)
     for (int x = 0; x < cover.width() * samples; ++x) {
       const Vec2d p{(x + 0.5) / samples, (y + 0.5) / samples};
-      if (Inside(outline, p)) EXPECT_TRUE(cover.Get(x / samples, y / samples)) << p.x << " " << p.y;
+      EXPECT_TRUE(!Inside(outline, p) || cover.Get(x / samples, y / samples)) << p.x << " " << p.y;
     }
 }
 
