@@ -215,8 +215,11 @@ PackResult Pack(std::span<const PackItem> items, const PackOptions& options) {
   Raster raster = RasterFor(options, side);
   std::optional<Outcome> best;
   const double least = Demand({}, 0, raster.gutter) * double(items.size());
-  if (least < texels)
-    best = SearchPlans(items, raster, texels, free_side, options.bruteForce ? kBruteEffort : kNormalEffort);
+  if (least < texels) best = SearchPlans(items, raster, texels, free_side, kNormalEffort);
+  if (options.bruteForce && best) {
+    auto other = SearchPlans(items, raster, texels, free_side, kBruteEffort);
+    if (other && other->Score(free_side) > best->Score(free_side)) best = std::move(other);
+  }
   if (!best) {
     // More charts than a page has room for, however small: as many pages as they need.
     raster.texels_per_unit = EstimateDensity(items, raster.gutter, 2 * std::max(texels, least));

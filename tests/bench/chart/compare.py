@@ -76,19 +76,21 @@ def faults(row):
 
 def variants(name, base):
     """The promises that one plain run cannot show: scale, resolution, blocks, fixed density on several pages."""
-    found = []
-    for factor in (0.001, 1000):
+    found, fills = [], []
+    for factor in (0.001, 1000, 1 / 1024, 1024):
         row = ours(name + "_scaled", scaled(name, factor))
         found += ["x%g: %s" % (factor, f) for f in faults(row)]
-        if abs(row["charts"] - base["charts"]) > 0.01 * base["charts"] or abs(row["util_touched"] - base["util_touched"]) > 0.02:
-            found.append("x%g: %d charts, util %.3f" % (factor, row["charts"], row["util_touched"]))
+        fills.append("%d / %.3f" % (row["charts"], row["util_touched"]))
+        # A power of two changes no bit of the input's mantissas: the same texels. Others round it, and greedy choices may differ.
+        if factor in (1 / 1024, 1024) and (row["charts"], row["util_touched"], row["L2"]) != (base["charts"], base["util_touched"], base["L2"]):
+            found.append("x%g: not the same atlas" % factor)
     row = ours(name + "_512", mesh_path(name), "--resolution", "512", "--block-align")
     found += ["512 blocks: " + f for f in faults(row)]
     if row["W"] > 512 or row["H"] > 512:
         found.append("resolution exceeded: %dx%d" % (row["W"], row["H"]))
     row = ours(name + "_pages", mesh_path(name), "--resolution", "512", "--texels-per-unit", "%.9g" % (0.6 * base["tpu"]))
     found += ["pages: " + f for f in faults(row) if not f.startswith("density") or row["pages"] == 1]
-    return found
+    return found, fills
 
 
 def cell(row, key, text="%.3f"):
@@ -100,22 +102,24 @@ def measure(name, quick):
     brute = ours(name + "_brute", mesh_path(name), "--brute-force")
     found = faults(plain) + ["brute: " + f for f in faults(brute)]
     small = plain["tris"] <= 200000
+    fills = []
     if small and not quick:
-        found += variants(name, plain)
+        more, fills = variants(name, plain)
+        found += more
     fits = vertex_count(mesh_path(name)) <= RIVAL_MAX_VERTICES
-    return {"name": name, "plain": plain, "brute": brute, "faults": found, "variants": small and not quick,
+    return {"name": name, "plain": plain, "brute": brute, "faults": found, "fills": fills,
             "rival": rival(name, 0) if fits else None, "rival_brute": rival(name, 1) if fits and small else None}
 
 
 HEAD = ("| mesh | triangles | charts xatlas / ours | util xatlas default, brute / ours default, brute | L2 xatlas / ours | "
-        "CPU s xatlas / ours | faults xatlas / ours |\n|---|---|---|---|---|---|---|\n")
+        "CPU s xatlas / ours | ours x0.001, x1000: charts / util | faults xatlas / ours |\n|---|---|---|---|---|---|---|---|\n")
 
 
 def line(r):
     x, xb, p, b = r["rival"], r["rival_brute"], r["plain"], r["brute"]
-    return "| %s | %d | %s / %d | %s, %s / %.3f, **%.3f** | %s / %.4f | %s / %.2f | %s / %s |\n" % (
+    return "| %s | %d | %s / %d | %s, %s / %.3f, **%.3f** | %s / %.4f | %s / %.2f | %s | %s / %s |\n" % (
         r["name"], p["tris"], cell(x, "charts", "%d"), p["charts"], cell(x, "util_touched"), cell(xb, "util_touched"), p["util_touched"],
-        b["util_touched"], cell(x, "L2", "%.4f"), p["L2"], cell(x, "cpu", "%.2f"), p["cpu"],
+        b["util_touched"], cell(x, "L2", "%.4f"), p["L2"], cell(x, "cpu", "%.2f"), p["cpu"], ", ".join(r["fills"][:2]) or "-",
         "; ".join(faults(x)) or "0" if x else "-", "; ".join(r["faults"]) or "0")
 
 
