@@ -132,7 +132,7 @@ class MeshWriter {
 };
 
 absl::Status CheckOptions(const PackOptions& options) {
-  if (options.resolution > 32768) return absl::InvalidArgumentError("resolution must not be above 32768");
+  if (options.resolution > 8192) return absl::InvalidArgumentError("resolution must not be above 8192");
   if (options.resolution > 0 && options.resolution < 16)
     return absl::InvalidArgumentError("resolution must be 0 or at least 16");
   if (options.padding > 256) return absl::InvalidArgumentError("padding must not be above 256");
@@ -182,7 +182,10 @@ absl::StatusOr<Atlas> PackCharts(std::span<const MeshDecl> meshes, std::span<con
   });
   std::vector<PackItem> items;
   for (const Prepared& p : prepared) items.push_back(p.item);
-  const PackResult packed = items.empty() ? PackResult{} : Pack(items, options);
+  PackResult packed;
+  if (!items.empty()) {
+    BAKEWELL_ASSIGN_OR_RETURN(packed, Pack(items, options));
+  }
   return Assemble(meshes, charts, refs, prepared, packed);
 }
 

@@ -26,6 +26,7 @@ struct GenerateOptions {
 // New charts for every lightmapped object of a scene: no overlaps, a gutter, one density times Object::density. Objects
 // that are not lightmapped get empty ObjectCharts; degenerate and non-finite triangles get kNoChart and UVs inside a
 // page. Pages are multiples of 4 texels. Same layout for any number of threads. kInvalidArgument names the object.
+// kResourceExhausted: more than 256 pages.
 absl::StatusOr<AtlasLayout> GenerateCharts(const Scene& scene, const GenerateOptions& options);
 
 // The charts of an atlas as a layout. mesh_of_object: one entry per layout object, the atlas' mesh or -1 (empty

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <string>
 
 #include "core/base/check.h"
 #include "server/chart/pack/density.h"
@@ -16,7 +17,8 @@ namespace {
 
 constexpr int kBlock = 4;
 constexpr int kDefaultSide = 1024;
-constexpr int kMaxSide = 32768;
+constexpr int kMaxSide = 8192;
+constexpr int kMaxPages = 256;
 constexpr int kMaxTrials = 40;
 // Side of the coarse pages on which plans are compared: a quarter of the page's, within bounds [cells].
 constexpr double kSketchShare = 0.25, kLeastSketch = 48, kLargestSketch = 256;
@@ -164,15 +166,24 @@ PackResult ToResult(Outcome outcome, int width, int height) {
   return result;
 }
 
+int MaxPages(std::span<const PackItem> items) { return static_cast<int>(std::min<size_t>(items.size(), kMaxPages)); }
+
+absl::Status TooManyPages(const Raster& raster) {
+  return absl::ResourceExhaustedError("the charts take more than " + std::to_string(kMaxPages) + " pages at " +
+                                      std::to_string(raster.texels_per_unit) +
+                                      " texels per unit: lower the density or raise the resolution");
+}
+
 // Given density and side: as many pages as it takes.
-PackResult PackPages(std::span<const PackItem> items, const Raster& raster, int side) {
-  const Grid grid{side / raster.cell, side / raster.cell, static_cast<int>(items.size())};
+absl::StatusOr<PackResult> PackPages(std::span<const PackItem> items, const Raster& raster, int side) {
+  const Grid grid{side / raster.cell, side / raster.cell, MaxPages(items)};
   Trial trial = PlaceAll(grid, MakeCandidates(items, raster), {});
+  if (!trial.complete) return TooManyPages(raster);
   return ToResult({std::move(trial), grid, raster}, grid.width * raster.cell, grid.height * raster.cell);
 }
 
 // Given density, free side: one page as large as need be.
-PackResult PackOnePage(std::span<const PackItem> items, const Raster& raster) {
+absl::StatusOr<PackResult> PackOnePage(std::span<const PackItem> items, const Raster& raster) {
   double demand = 0, longest = 1;
   for (const PackItem& item : items) {
     demand += Demand(item, raster.texels_per_unit, raster.gutter);
@@ -181,8 +192,9 @@ PackResult PackOnePage(std::span<const PackItem> items, const Raster& raster) {
   }
   const double side = std::min<double>(kMaxSide, std::max(std::sqrt(demand * 1.1), longest));
   const int width = RoundUp(static_cast<int>(side), kBlock) / raster.cell;
-  const Grid grid{width, 2 * width, static_cast<int>(items.size())};
+  const Grid grid{width, 2 * width, MaxPages(items)};
   Trial trial = PlaceAll(grid, MakeCandidates(items, raster), {});
+  if (!trial.complete) return TooManyPages(raster);
   const int used_width = RoundUp(trial.used_width * raster.cell, kBlock);
   const int used_height = RoundUp(trial.used_height * raster.cell, kBlock);
   return ToResult({std::move(trial), grid, raster}, used_width, used_height);
@@ -203,7 +215,7 @@ Raster RasterFor(const PackOptions& options, int side) {
 
 }  // namespace
 
-PackResult Pack(std::span<const PackItem> items, const PackOptions& options) {
+absl::StatusOr<PackResult> Pack(std::span<const PackItem> items, const PackOptions& options) {
   BAKEWELL_CHECK(!items.empty());
   const bool free_side = options.resolution == 0;
   const int side = free_side ? kDefaultSide : static_cast<int>(options.resolution);

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import statistics
+import struct
 import subprocess
 import sys
 import time
@@ -62,7 +63,9 @@ def scaled(name, factor):
     with open(mesh_path(name)) as source, open(path, "w") as out:
         for line in source:
             if line.startswith("v "):
-                line = "v %.9g %.9g %.9g\n" % tuple(float(x) * factor for x in line.split()[1:4])
+                # From the float that the reader sees, so that a power of two changes no bit of the mantissa.
+                floats = struct.unpack("3f", struct.pack("3f", *map(float, line.split()[1:4])))
+                line = "v %.17g %.17g %.17g\n" % tuple(x * factor for x in floats)
             out.write(line)
     return path
 

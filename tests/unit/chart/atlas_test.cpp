@@ -139,6 +139,18 @@ TEST(ChartAtlas, IndexOutOfRangeIsTheCallersFault) {
   EXPECT_EQ(atlas.status().code(), absl::StatusCode::kInvalidArgument);
 }
 
+TEST(ChartAtlas, AbsurdDensityIsRefusedNotAllocated) {
+  Soup soup;
+  for (uint32_t i = 0; i < 300; ++i) {
+    const float z = static_cast<float>(i);
+    soup.position.insert(soup.position.end(), {{0, 0, z}, {1, 0, z}, {1, 1, z}});
+    soup.index.insert(soup.index.end(), {3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  const MeshDecl decl = soup.Decl();
+  const auto atlas = Generate(std::span(&decl, 1), {}, {.texelsPerUnit = 1e9f, .resolution = 64});
+  EXPECT_EQ(atlas.status().code(), absl::StatusCode::kResourceExhausted);
+}
+
 TEST(ChartAtlas, NothingToChartIsAnEmptyAtlas) {
   const MeshDecl decl;
   const auto atlas = Generate(std::span(&decl, 1), {}, {});
