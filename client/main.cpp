@@ -4,9 +4,10 @@
 
 #include "client/cli/cli.h"
 #include "client/local/bake.h"
+#include "client/local/unwrap.h"
 
 int main(int argc, char** argv) {
   const bakewell::Console console{std::cout, std::cerr, ::isatty(STDERR_FILENO) == 1};
-  const bakewell::Bakers bakers{bakewell::Bake, bakewell::BakeReference};
+  const bakewell::Bakers bakers{bakewell::Bake, bakewell::BakeReference, bakewell::Unwrap};
   return bakewell::RunCli(argc, argv, console, bakers);
 }

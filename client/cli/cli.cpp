@@ -53,6 +53,7 @@ int RunCli(int argc, const char* const* argv, const Console& console, const Bake
   AddBakeCommand(app, console, bakers, &exit_code);
   AddReferenceCommand(app, console, bakers, &exit_code);
   AddCompareCommand(app, console, &exit_code);
+  AddUnwrapCommand(app, console, bakers, &exit_code);
   if (argc > 1 && argv[1][0] != '-' && !HasCommand(app, argv[1])) {
     console.err << "bakewell: there is no command " << argv[1] << "; bakewell --help lists them" << std::endl;
     return kExitUserError;

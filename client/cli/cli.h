@@ -4,13 +4,15 @@
 #include <ostream>
 
 #include "client/local/bake.h"
+#include "client/local/unwrap.h"
 
 namespace bakewell {
 
-// What the commands call to do the work; main() passes Bake and BakeReference.
+// What the commands call to do the work; main() passes Bake, BakeReference and Unwrap.
 struct Bakers {
   std::function<absl::StatusOr<BakeSummary>(const BakeRequest&, Progress&)> bake;
   std::function<absl::StatusOr<BakeSummary>(const ReferenceRequest&, Progress&)> reference;
+  std::function<absl::StatusOr<UnwrapReport>(const UnwrapRequest&)> unwrap = {};
 };
 
 // Where a command prints: results on `out`, progress, warnings and errors on `err`; with --json all of it on `out`,

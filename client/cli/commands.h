@@ -10,6 +10,7 @@ namespace bakewell {
 void AddBakeCommand(CLI::App& app, const Console& console, const Bakers& bakers, int* exit_code);
 void AddReferenceCommand(CLI::App& app, const Console& console, const Bakers& bakers, int* exit_code);
 void AddCompareCommand(CLI::App& app, const Console& console, int* exit_code);
+void AddUnwrapCommand(CLI::App& app, const Console& console, const Bakers& bakers, int* exit_code);
 
 enum class OutputForm { kText, kJson };
 

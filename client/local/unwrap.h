@@ -2,31 +2,33 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "core/base/status.h"
 #include "server/chart/options.h"
-
-namespace CLI {
-class App;
-}
 
 namespace bakewell {
 
 // Everything `bakewell unwrap` can be asked for.
 struct UnwrapRequest {
-  std::filesystem::path input, output;  // .obj or .glb/.gltf, both of one kind
-  std::filesystem::path picture;        // .png of the pages, charts coloured; empty: none
+  std::filesystem::path input, output;  // .obj to .obj, or .glb/.gltf to .glb
+  std::filesystem::path picture;        // .png of the pages, charts coloured (name-0.png, ... for several); empty: none
   chart::ChartOptions chart;
   chart::PackOptions pack;
-  bool json = false;
 };
 
-// Charts and packs the input, writes the output (whole or not at all), prints one line of statistics (one JSON object
-// with request.json) to stdout.
-absl::Status Unwrap(const UnwrapRequest& request);
+// What was made.
+struct UnwrapReport {
+  int64_t triangles = 0, set_aside = 0;  // set aside: degenerate or not finite, without a chart
+  int64_t charts = 0, pages = 0;
+  int64_t width = 0, height = 0;  // of every page [texels]
+  double texels_per_unit = 0;
+  double mean_utilization = 0;                         // of the pages
+  double chart_cpu_s = 0, pack_cpu_s = 0, wall_s = 0;  // without reading and writing files
+  std::vector<std::string> warnings;                   // of the level's reader
+};
 
-// Adds `unwrap in -o out` with every option as a flag to a CLI11 program; `exit_code` is set when it has run (0, or 2
-// after an error that is printed to stderr). `exit_code` must outlive the program's parsing.
-void RegisterUnwrap(CLI::App& program, int& exit_code);
+// Charts and packs the input and writes the output, whole or not at all. kInvalidArgument: the files or an option.
+absl::StatusOr<UnwrapReport> Unwrap(const UnwrapRequest& request);
 
 }  // namespace bakewell

@@ -8,6 +8,7 @@
 #include "core/base/check.h"
 #include "server/chart/pack/orient.h"
 #include "server/chart/pack/pack.h"
+#include "server/chart/rounding.h"
 
 namespace bakewell::chart {
 namespace {
@@ -69,15 +70,14 @@ class MeshWriter {
     const FlatChart& flat = charts_.charts[c];
     Chart chart;
     chart.atlasIndex = static_cast<uint32_t>(placement.page);
+    std::vector<Vec2d> position;
+    for (const Vec2d uv : flat.uv) position.push_back(ToPage(placement, upright(uv)));
+    const std::vector<TexelUv> rounded = RoundToFloat(flat.corner, position, page);
     const std::vector<Use> uses = VertexUses(flat);
     const uint32_t base = static_cast<uint32_t>(mesh_.vertexArray.size());
     for (const Use& use : uses) {
-      const Vec2d p = ToPage(placement, upright(flat.uv[use.local]));
-      mesh_.vertexArray.push_back(
-          {placement.page,
-           static_cast<int32_t>(c),
-           {static_cast<float>(std::clamp(p.x, 0.0, page.x)), static_cast<float>(std::clamp(p.y, 0.0, page.y))},
-           use.source});
+      const TexelUv uv = rounded[use.local];
+      mesh_.vertexArray.push_back({placement.page, static_cast<int32_t>(c), {uv.x, uv.y}, use.source});
     }
     for (size_t i = 0; i < flat.face.size(); ++i) {
       const uint32_t triangle = charts_.surface.source[flat.face[i]];
@@ -132,7 +132,7 @@ class MeshWriter {
 };
 
 absl::Status CheckOptions(const PackOptions& options) {
-  if (options.resolution > 32768) return absl::InvalidArgumentError("resolution must not be above 32768");
+  if (options.resolution > 8192) return absl::InvalidArgumentError("resolution must not be above 8192");
   if (options.resolution > 0 && options.resolution < 16)
     return absl::InvalidArgumentError("resolution must be 0 or at least 16");
   if (options.padding > 256) return absl::InvalidArgumentError("padding must not be above 256");
@@ -182,7 +182,10 @@ absl::StatusOr<Atlas> PackCharts(std::span<const MeshDecl> meshes, std::span<con
   });
   std::vector<PackItem> items;
   for (const Prepared& p : prepared) items.push_back(p.item);
-  const PackResult packed = items.empty() ? PackResult{} : Pack(items, options);
+  PackResult packed;
+  if (!items.empty()) {
+    BAKEWELL_ASSIGN_OR_RETURN(packed, Pack(items, options));
+  }
   return Assemble(meshes, charts, refs, prepared, packed);
 }
 

@@ -64,7 +64,7 @@ struct MeshCharts {
 absl::StatusOr<std::vector<MeshCharts>> ComputeCharts(std::span<const MeshDecl> meshes, const ChartOptions& options);
 
 // Packing only; may be called again with other densities or options. meshes: those that `charts` were computed from.
-// kInvalidArgument: an option out of range.
+// kInvalidArgument: an option out of range. kResourceExhausted: more than 256 pages.
 absl::StatusOr<Atlas> PackCharts(std::span<const MeshDecl> meshes, std::span<const MeshCharts> charts,
                                  const PackOptions& options);
 

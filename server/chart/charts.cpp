@@ -1,7 +1,10 @@
 #include <tbb/parallel_for.h>
 
+#include <numeric>
+
 #include "server/chart/atlas.h"
 #include "server/chart/flatten/flatten.h"
+#include "server/chart/input_uv.h"
 #include "server/chart/pack/orient.h"
 #include "server/chart/segment/relax.h"
 #include "server/chart/segment/segment.h"
@@ -66,20 +69,45 @@ double RectangleFill(const Surface& surface, std::span<const FlatChart> charts) 
 
 // Relaxed charts are rounder, but where a surface has features their borders leave those: both are laid out and the
 // better fill wins, if it does not cost charts. Above kMaxComparedFaces only the relaxed ones.
+std::vector<FlatChart> GrowCharts(const Surface& surface, std::span<const uint8_t> seam, const ChartOptions& options) {
+  const std::vector<uint32_t> grown = Segment(surface, options, seam);
+  std::vector<uint32_t> relaxed = grown;
+  for (uint32_t i = 0; i < options.maxIterations; ++i) relaxed = RelaxOnce(surface, relaxed);
+  if (options.maxIterations > 0) CutTeeth(surface, relaxed);
+  std::vector<FlatChart> charts = FlattenAll(surface, relaxed, options);
+  if (relaxed == grown || surface.FaceCount() > kMaxComparedFaces) return charts;
+  std::vector<FlatChart> plain = FlattenAll(surface, grown, options);
+  const double gain = RectangleFill(surface, charts) - RectangleFill(surface, plain);
+  const bool keep = gain > kLeastFillGain && double(charts.size()) <= kMaxMoreCharts * double(plain.size()) + 1;
+  return keep ? charts : plain;
+}
+
+// The input's own charts; what is not valid of them is charted anew.
+std::vector<FlatChart> KeepInputCharts(const Surface& surface, const InputUv& input, const ChartOptions& options) {
+  std::vector<uint32_t> all(surface.FaceCount());
+  std::iota(all.begin(), all.end(), 0u);
+  std::vector<FlatChart> charts;
+  for (const auto& part : ConnectedParts(surface, all)) {
+    if (auto chart = ChartFromInput(surface, part, input)) {
+      charts.push_back(*std::move(chart));
+      continue;
+    }
+    for (FlatChart& chart : Flatten(surface, part, options)) charts.push_back(std::move(chart));
+  }
+  return charts;
+}
+
 MeshCharts ChartMesh(const MeshDecl& mesh, const ChartOptions& options) {
   MeshCharts result;
   result.surface = BuildSurface(mesh.vertexPositionData, mesh.indexData);
-  const Surface& surface = result.surface;
-  const std::vector<uint32_t> grown = Segment(surface, options);
-  std::vector<uint32_t> relaxed = grown;
-  for (uint32_t i = 0; i < options.maxIterations; ++i) relaxed = RelaxOnce(surface, relaxed);
-  result.charts = FlattenAll(surface, relaxed, options);
-  if (relaxed != grown && surface.FaceCount() <= kMaxComparedFaces) {
-    std::vector<FlatChart> plain = FlattenAll(surface, grown, options);
-    const double gain = RectangleFill(surface, result.charts) - RectangleFill(surface, plain);
-    const bool keep =
-        gain > kLeastFillGain && double(result.charts.size()) <= kMaxMoreCharts * double(plain.size()) + 1;
-    if (!keep) result.charts = std::move(plain);
+  std::vector<uint8_t> seam;
+  const InputUv input{mesh.vertexUvData, mesh.indexData};
+  if (!mesh.vertexUvData.empty()) seam = InputSeams(result.surface, input);
+  if (options.useInputMeshUvs && !seam.empty()) {
+    CutAlong(seam, result.surface);
+    result.charts = KeepInputCharts(result.surface, input, options);
+  } else {
+    result.charts = GrowCharts(result.surface, seam, options);
   }
   result.density.assign(result.charts.size(), mesh.density);
   return result;

@@ -35,15 +35,38 @@ ObjectCharts ToObjectCharts(const chart::Mesh& mesh, int32_t first_chart) {
   return charts;
 }
 
-AtlasLayout ToLayout(const Scene& scene, const chart::Atlas& atlas) {
+absl::Status ApplyDensities(const std::vector<float>& factor, std::vector<chart::MeshCharts>& charts) {
+  if (factor.empty()) return absl::OkStatus();
+  size_t next = 0;
+  for (chart::MeshCharts& mesh : charts)
+    for (float& density : mesh.density) {
+      if (next >= factor.size() || !(factor[next] > 0))
+        return absl::InvalidArgumentError("chart_density: chart " + std::to_string(next) + " needs a factor above 0");
+      density *= factor[next++];
+    }
+  if (next == factor.size()) return absl::OkStatus();
+  return absl::InvalidArgumentError("chart_density has " + std::to_string(factor.size()) + " factors for " +
+                                    std::to_string(next) + " charts");
+}
+
+// Lightmapped objects are the atlas' meshes, in order.
+std::vector<int> MeshOfObject(const Scene& scene) {
+  std::vector<int> meshes;
+  int next = 0;
+  for (const Object& object : scene.objects) meshes.push_back(object.lightmapped ? next++ : -1);
+  return meshes;
+}
+
+}  // namespace
+
+AtlasLayout ToLayout(const chart::Atlas& atlas, std::span<const int> mesh_of_object) {
   AtlasLayout layout;
   layout.texels_per_metre = atlas.texelsPerUnit;
   layout.pages.assign(atlas.atlasCount, {static_cast<int>(atlas.width), static_cast<int>(atlas.height)});
-  layout.objects.resize(scene.objects.size());
-  size_t next = 0;
-  for (size_t o = 0; o < scene.objects.size(); ++o) {
-    if (!scene.objects[o].lightmapped) continue;
-    const chart::Mesh& mesh = atlas.meshes[next++];
+  layout.objects.resize(mesh_of_object.size());
+  for (size_t o = 0; o < mesh_of_object.size(); ++o) {
+    if (mesh_of_object[o] < 0) continue;
+    const chart::Mesh& mesh = atlas.meshes[mesh_of_object[o]];
     layout.objects[o] = ToObjectCharts(mesh, static_cast<int32_t>(layout.charts.size()));
     for (const chart::Chart& chart : mesh.chartArray)
       layout.charts.push_back({static_cast<int>(chart.atlasIndex), static_cast<int>(o)});
@@ -51,15 +74,15 @@ AtlasLayout ToLayout(const Scene& scene, const chart::Atlas& atlas) {
   return layout;
 }
 
-}  // namespace
-
 absl::StatusOr<AtlasLayout> GenerateCharts(const Scene& scene, const GenerateOptions& options) {
   BAKEWELL_ASSIGN_OR_RETURN(const std::vector<chart::MeshDecl> meshes, LightmappedMeshes(scene));
   chart::PackOptions pack = options.pack;
   pack.resolution = static_cast<uint32_t>(options.resolution > 0 ? options.resolution : options.max_resolution);
   pack.texelsPerUnit = options.texels_per_metre;
-  BAKEWELL_ASSIGN_OR_RETURN(const chart::Atlas atlas, chart::Generate(meshes, options.chart, pack));
-  return ToLayout(scene, atlas);
+  BAKEWELL_ASSIGN_OR_RETURN(std::vector<chart::MeshCharts> charts, chart::ComputeCharts(meshes, options.chart));
+  BAKEWELL_RETURN_IF_ERROR(ApplyDensities(options.chart_density, charts));
+  BAKEWELL_ASSIGN_OR_RETURN(const chart::Atlas atlas, chart::PackCharts(meshes, charts, pack));
+  return ToLayout(atlas, MeshOfObject(scene));
 }
 
 }  // namespace bakewell

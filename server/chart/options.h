@@ -16,7 +16,7 @@ struct ChartOptions {
   float maxCost = 2;                // charts stop growing where the weighted sum exceeds this
   uint32_t maxIterations = 2;       // passes that round charts and straighten their borders after growing
   bool useInputMeshUvs = false;     // keep the input's UV charts (rescaled to one density), generate where invalid
-  bool fixWinding = false;          // turn faces so that neighbours agree before charting
+  bool fixWinding = false;          // kept for compatibility: UVs always run counter-clockwise here
   float maxStretch = 1.004f;        // ours: bound of a chart's Sander L2 stretch; a chart above it is split
 };
 
@@ -26,7 +26,7 @@ struct PackOptions {
   uint32_t padding = 2;            // empty texels between any two charts
   float texelsPerUnit = 0;         // density; 0: searched so that one page of `resolution` is full
   uint32_t resolution = 0;         // page side, never exceeded; 0: 1024 if texelsPerUnit is 0, else what one page needs
-  bool bilinear = true;            // footprints count every texel that bilinear filtering at a border reads
+  bool bilinear = true;            // a gutter of at least 2, so that no filter tap on a chart reads another
   bool blockAlign = false;         // no two charts share a 4x4 block
   bool bruteForce = false;         // search longer for a denser packing
   bool rotateChartsToAxis = true;  // turn charts so that their bounding rectangle is upright

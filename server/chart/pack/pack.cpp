@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
+#include <string>
 
 #include "core/base/check.h"
 #include "server/chart/pack/density.h"
@@ -15,18 +17,21 @@ namespace {
 
 constexpr int kBlock = 4;
 constexpr int kDefaultSide = 1024;
-constexpr int kMaxSide = 32768;
+constexpr int kMaxSide = 8192;
+constexpr int kMaxPages = 256;
 constexpr int kMaxTrials = 40;
-constexpr int kSketchSide = 256;  // cells of the coarse pages on which plans are compared
+// Side of the coarse pages on which plans are compared: a quarter of the page's, within bounds [cells].
+constexpr double kSketchShare = 0.25, kLeastSketch = 48, kLargestSketch = 256;
 
 // How hard to look.
 struct Effort {
-  int trials;     // densities
-  int plans;      // orders and page shapes that are sketched, for few charts
-  int finalists;  // of them, those that get a density search
+  int trials;         // densities
+  int plans;          // orders and page shapes that are sketched, for few charts
+  int semifinalists;  // of them, those that are packed at full size
+  int finalists;      // of those, the ones that get a density search
   int tilts;
 };
-constexpr Effort kNormalEffort{6, 108, 2, 2}, kBruteEffort{16, 432, 6, 4};
+constexpr Effort kNormalEffort{5, 108, 8, 1, 2}, kBruteEffort{12, 432, 32, 4, 4};
 
 struct Plan {
   Order order;
@@ -73,27 +78,39 @@ std::vector<Plan> MakePlans(int count, bool free_shape) {
   return plans;
 }
 
-// Packs every plan at one coarse density and sorts them by the page area they use.
-std::vector<Plan> RankPlans(std::span<const PackItem> items, std::vector<Plan> plans, Raster raster, double texels) {
-  const double shrink = kSketchSide / std::sqrt(texels);
-  raster.texels_per_unit =
-      std::min(EstimateDensity(items, raster.gutter, 0.85 * texels), LargestUnclampedDensity(items, raster)) * shrink;
-  raster.cell = 1;
-  raster.gutter = 0;
-  const std::vector<Candidate> candidates = MakeCandidates(items, raster);
+// Packs every plan at one density and sorts them by the page area they use.
+std::vector<Plan> RankPlans(std::span<const Candidate> candidates, const std::vector<Plan>& plans, double page_texels,
+                            int cell) {
   std::vector<double> area(plans.size());
   tbb::parallel_for(size_t{0}, plans.size(), [&](size_t i) {
-    Grid grid = GridOf(kSketchSide * kSketchSide, plans[i].aspect, 1);
+    Grid grid = GridOf(page_texels, plans[i].aspect, cell);
     grid.height *= 3;
     const Trial trial = PlaceAll(grid, candidates, plans[i].order);
     area[i] = trial.complete ? double(trial.used_height) * grid.width : INFINITY;
   });
   std::vector<size_t> order(plans.size());
-  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return area[a] < area[b]; });
   std::vector<Plan> ranked;
   for (const size_t i : order) ranked.push_back(plans[i]);
   return ranked;
+}
+
+// The best plans, first by coarse sketches without gutters, then by whole texels.
+std::vector<Plan> BestPlans(std::span<const PackItem> items, std::vector<Plan> plans, Raster raster, double texels,
+                            const Effort& effort) {
+  raster.texels_per_unit =
+      std::min(EstimateDensity(items, raster.gutter, 0.85 * texels), LargestUnclampedDensity(items, raster));
+  Raster sketch = raster;
+  const double side = std::clamp(kSketchShare * std::sqrt(texels), kLeastSketch, kLargestSketch);
+  sketch.texels_per_unit *= side / std::sqrt(texels);
+  sketch.cell = 1;
+  sketch.gutter = 0;
+  plans = RankPlans(MakeCandidates(items, sketch), plans, side * side, 1);
+  plans.resize(std::min<size_t>(plans.size(), effort.semifinalists));
+  plans = RankPlans(MakeCandidates(items, raster), plans, texels, raster.cell);
+  plans.resize(std::min<size_t>(plans.size(), effort.finalists));
+  return plans;
 }
 
 // The largest density that fits one page: a page twice as high tells by how much a trial misses.
@@ -126,8 +143,7 @@ std::optional<Outcome> SearchPlans(std::span<const PackItem> items, Raster raste
   const int affordable = static_cast<int>(size_t(effort.plans) * 64 / std::max<size_t>(items.size(), 64));
   raster.tilts = affordable > 1 ? effort.tilts : 1;
   std::vector<Plan> plans = MakePlans(std::max(affordable, 1), free_shape && affordable > 1);
-  if (plans.size() > 1) plans = RankPlans(items, std::move(plans), raster, texels);
-  plans.resize(std::min<size_t>(plans.size(), effort.finalists));
+  if (plans.size() > 1) plans = BestPlans(items, std::move(plans), raster, texels, effort);
   std::optional<Outcome> best;
   for (const Plan& plan : plans) {
     auto outcome = SearchDensity(items, raster, GridOf(texels, plan.aspect, raster.cell), plan, effort.trials);
@@ -150,15 +166,24 @@ PackResult ToResult(Outcome outcome, int width, int height) {
   return result;
 }
 
+int MaxPages(std::span<const PackItem> items) { return static_cast<int>(std::min<size_t>(items.size(), kMaxPages)); }
+
+absl::Status TooManyPages(const Raster& raster) {
+  return absl::ResourceExhaustedError("the charts take more than " + std::to_string(kMaxPages) + " pages at " +
+                                      std::to_string(raster.texels_per_unit) +
+                                      " texels per unit: lower the density or raise the resolution");
+}
+
 // Given density and side: as many pages as it takes.
-PackResult PackPages(std::span<const PackItem> items, const Raster& raster, int side) {
-  const Grid grid{side / raster.cell, side / raster.cell, static_cast<int>(items.size())};
+absl::StatusOr<PackResult> PackPages(std::span<const PackItem> items, const Raster& raster, int side) {
+  const Grid grid{side / raster.cell, side / raster.cell, MaxPages(items)};
   Trial trial = PlaceAll(grid, MakeCandidates(items, raster), {});
+  if (!trial.complete) return TooManyPages(raster);
   return ToResult({std::move(trial), grid, raster}, grid.width * raster.cell, grid.height * raster.cell);
 }
 
 // Given density, free side: one page as large as need be.
-PackResult PackOnePage(std::span<const PackItem> items, const Raster& raster) {
+absl::StatusOr<PackResult> PackOnePage(std::span<const PackItem> items, const Raster& raster) {
   double demand = 0, longest = 1;
   for (const PackItem& item : items) {
     demand += Demand(item, raster.texels_per_unit, raster.gutter);
@@ -167,8 +192,9 @@ PackResult PackOnePage(std::span<const PackItem> items, const Raster& raster) {
   }
   const double side = std::min<double>(kMaxSide, std::max(std::sqrt(demand * 1.1), longest));
   const int width = RoundUp(static_cast<int>(side), kBlock) / raster.cell;
-  const Grid grid{width, 2 * width, static_cast<int>(items.size())};
+  const Grid grid{width, 2 * width, MaxPages(items)};
   Trial trial = PlaceAll(grid, MakeCandidates(items, raster), {});
+  if (!trial.complete) return TooManyPages(raster);
   const int used_width = RoundUp(trial.used_width * raster.cell, kBlock);
   const int used_height = RoundUp(trial.used_height * raster.cell, kBlock);
   return ToResult({std::move(trial), grid, raster}, used_width, used_height);
@@ -189,7 +215,7 @@ Raster RasterFor(const PackOptions& options, int side) {
 
 }  // namespace
 
-PackResult Pack(std::span<const PackItem> items, const PackOptions& options) {
+absl::StatusOr<PackResult> Pack(std::span<const PackItem> items, const PackOptions& options) {
   BAKEWELL_CHECK(!items.empty());
   const bool free_side = options.resolution == 0;
   const int side = free_side ? kDefaultSide : static_cast<int>(options.resolution);
@@ -201,8 +227,11 @@ PackResult Pack(std::span<const PackItem> items, const PackOptions& options) {
   Raster raster = RasterFor(options, side);
   std::optional<Outcome> best;
   const double least = Demand({}, 0, raster.gutter) * double(items.size());
-  if (least < texels)
-    best = SearchPlans(items, raster, texels, free_side, options.bruteForce ? kBruteEffort : kNormalEffort);
+  if (least < texels) best = SearchPlans(items, raster, texels, free_side, kNormalEffort);
+  if (options.bruteForce && best) {
+    auto other = SearchPlans(items, raster, texels, free_side, kBruteEffort);
+    if (other && other->Score(free_side) > best->Score(free_side)) best = std::move(other);
+  }
   if (!best) {
     // More charts than a page has room for, however small: as many pages as they need.
     raster.texels_per_unit = EstimateDensity(items, raster.gutter, 2 * std::max(texels, least));

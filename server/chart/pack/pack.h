@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/status.h"
 #include "server/chart/options.h"
 #include "server/chart/pack/item.h"
 
@@ -19,6 +20,7 @@ struct PackResult {
 
 // Packs charts so that none come closer than the padding. Without a density the largest is searched at which
 // everything fits one page. Same result for any number of threads. Items: at least one.
-PackResult Pack(std::span<const PackItem> items, const PackOptions& options);
+// kResourceExhausted: at this density and page size it takes more than 256 pages.
+absl::StatusOr<PackResult> Pack(std::span<const PackItem> items, const PackOptions& options);
 
 }  // namespace bakewell::chart

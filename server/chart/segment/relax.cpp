@@ -1,6 +1,7 @@
 #include "server/chart/segment/relax.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <queue>
 #include <tuple>
@@ -11,6 +12,7 @@ namespace {
 constexpr double kTurnPenalty = 8;       // per 1 - cos of an edge's angle
 constexpr double kDeviationPenalty = 2;  // per 1 - cos of the angle to the chart's mean normal
 constexpr double kSharp = 0.134;         // 1 - cos(30 degrees)
+constexpr int kToothPasses = 4;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Entry {
@@ -106,6 +108,21 @@ class Relaxation {
 
 std::vector<uint32_t> RelaxOnce(const Surface& surface, const std::vector<uint32_t>& label) {
   return Relaxation(surface, label).Run();
+}
+
+void CutTeeth(const Surface& surface, std::vector<uint32_t>& label) {
+  for (int pass = 0; pass < kToothPasses; ++pass)
+    for (uint32_t f = 0; f < label.size(); ++f) {
+      const auto& [a, b, c] = surface.across[f];
+      for (const auto& [g, h, own] : {std::array{a, b, c}, std::array{b, c, a}, std::array{c, a, b}}) {
+        if (g == kNone || h == kNone || own == kNone) continue;
+        if (label[g] != label[h] || label[g] == label[f] || label[own] != label[f]) continue;
+        if (std::max(1 - Dot(surface.normal[f], surface.normal[g]), 1 - Dot(surface.normal[f], surface.normal[h])) >
+            kSharp)
+          continue;
+        label[f] = label[g];
+      }
+    }
 }
 
 }  // namespace bakewell::chart

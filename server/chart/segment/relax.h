@@ -13,4 +13,8 @@ namespace bakewell::chart {
 // connected. O(n log n).
 std::vector<uint32_t> RelaxOnce(const Surface& surface, const std::vector<uint32_t>& label);
 
+// Gives faces that hang on their chart by one edge, and have the same other chart across the two others, to that chart,
+// unless an edge between them is sharp. Charts stay connected. O(n).
+void CutTeeth(const Surface& surface, std::vector<uint32_t>& label);
+
 }  // namespace bakewell::chart

@@ -10,9 +10,9 @@ namespace {
 
 constexpr int kStepsPerCost = 512;
 constexpr int kMaxLevels = 8192;
-// Mean deviation 1 - |sum of area normals| / area at which the normal term counts 1: that of a spherical cap of 77
+// Mean deviation 1 - |sum of area normals| / area at which the normal term counts 1: that of a spherical cap of 64
 // degrees.
-constexpr double kUnitDeviation = 0.39;
+constexpr double kUnitDeviation = 0.28;
 constexpr double kCreaseScale = 0.7, kRaggedScale = 0.12;
 constexpr float kAlwaysSeam = 1000;
 // Curved charts are solved for; sparse factorisation grows faster than n log n, so their size is bounded.

@@ -1,13 +1,8 @@
-#include <CLI/CLI.hpp>
+#include <iostream>
 
-#include "client/local/unwrap.h"
+#include "client/cli/cli.h"
 
-// `bakewell unwrap` alone, for the bench.
+// `bakewell unwrap` alone, for the bench: it links nothing that bakes.
 int main(int argc, char** argv) {
-  CLI::App program("bakewell unwrap");
-  int exit_code = 0;
-  bakewell::RegisterUnwrap(program, exit_code);
-  program.require_subcommand(1);
-  CLI11_PARSE(program, argc, argv);
-  return exit_code;
+  return bakewell::RunCli(argc, argv, {std::cout, std::cerr, false}, {{}, {}, bakewell::Unwrap});
 }
