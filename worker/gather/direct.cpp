@@ -1,6 +1,8 @@
 #include "worker/gather/direct.h"
 
 #include <algorithm>
+#include <numeric>
+#include <tuple>
 
 #include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
@@ -9,7 +11,8 @@
 namespace bakewell {
 namespace {
 
-constexpr int kProbesPerLight = 8;
+constexpr uint32_t kProbesPerLight = 8;
+constexpr size_t kMostProbed = 256;    // lights; the rest count as seen
 constexpr float kUnseenShare = 0.05f;  // a light that no probe saw keeps this share of its importance
 
 }  // namespace
@@ -18,12 +21,11 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
                        GatherCounters& counters)
     : scene_(scene), visibility_(static_cast<size_t>(scene.lights.local_count()), 1.0f) {
   if (scene.lights.local_count() < 2 || begin == end) return;
-  for (int light = 0; light < scene.lights.local_count(); ++light) {
+  for (const int light : WorthProbing(map, begin, end)) {
     int tried = 0, seen = 0;
-    for (int i = 0; i < kProbesPerLight; ++i) {
-      const uint32_t which = begin + (end - begin) * static_cast<uint32_t>(2 * i + 1) / (2 * kProbesPerLight);
-      const Texel& texel = map.texels[which];
-      const uint32_t probe_key = HashCombine(HashCombine(key, static_cast<uint32_t>(light)), static_cast<uint32_t>(i));
+    for (uint32_t i = 0; i < kProbesPerLight; ++i) {
+      const Texel& texel = map.texels[begin + (end - begin) * (2 * i + 1) / (2 * kProbesPerLight)];
+      const uint32_t probe_key = HashCombine(HashCombine(key, static_cast<uint32_t>(light)), i);
       const LightSample sample = scene.lights.SampleLocal(
           light, texel.position, {UnitFloat(HashCombine(probe_key, 1)), UnitFloat(HashCombine(probe_key, 2))});
       if (MaxComponent(sample.perpendicular) <= 0 || Dot(sample.dir, texel.normal) <= 0) continue;
@@ -37,6 +39,22 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
       visibility_[light] = std::max(kUnseenShare, static_cast<float>(seen) / static_cast<float>(tried));
     }
   }
+}
+
+std::vector<int> TileLights::WorthProbing(const TexelMap& map, uint32_t begin, uint32_t end) const {
+  std::vector<int> lights(visibility_.size());
+  std::iota(lights.begin(), lights.end(), 0);
+  if (lights.size() <= kMostProbed) return lights;
+  Vec3f center;
+  for (uint32_t i = begin; i < end; ++i) center += map.texels[i].position / static_cast<float>(end - begin);
+  float radius = 0;
+  for (uint32_t i = begin; i < end; ++i) radius = std::max(radius, Length(map.texels[i].position - center));
+  std::vector<float> importance;
+  for (const int light : lights) importance.push_back(scene_.lights.Importance(light, center, {}, radius));
+  std::nth_element(lights.begin(), lights.begin() + kMostProbed, lights.end(),
+                   [&](int a, int b) { return std::tuple(-importance[a], a) < std::tuple(-importance[b], b); });
+  lights.resize(kMostProbed);
+  return lights;
 }
 
 TileLights::Choice TileLights::ForTexel(const Texel& texel, float radius) const {

@@ -26,6 +26,9 @@ class TileLights {
   Choice ForTexel(const Texel& texel, float radius) const;
 
  private:
+  // The lights that matter most to the tile, at most 256.
+  std::vector<int> WorthProbing(const TexelMap& map, uint32_t begin, uint32_t end) const;
+
   const GatherScene& scene_;
   std::vector<float> visibility_;  // per local light, (0, 1]
 };

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "worker/gather/direct.h"
 #include "worker/sample/mis.h"
@@ -53,7 +54,7 @@ class TileGatherer {
   std::vector<TexelLight> Run(const AtlasLayout& layout) {
     Prepare(layout);
     Round(0, static_cast<uint32_t>(options_.min_samples));
-    for (Work& work : work_) Validate(work);
+    for (size_t i = 0; i < work_.size(); ++i) Validate(map_.texels[begin_ + i], work_[i]);
     Decide();
     for (int done = options_.min_samples; done < options_.max_samples; done *= 2) {
       if (!Round(static_cast<uint32_t>(done), static_cast<uint32_t>(2 * done))) break;
@@ -67,13 +68,13 @@ class TileGatherer {
  private:
   void Prepare(const AtlasLayout& layout) {
     const uint32_t tile_key = TexelKey(map_.texels[begin_], options_.seed ^ 0x711eu);
-    const TileLights lights(scene_, map_, begin_, end_, tile_key, counters_);
+    lights_.emplace(scene_, map_, begin_, end_, tile_key, counters_);
     work_.reserve(end_ - begin_);
     for (uint32_t i = begin_; i < end_; ++i) {
       const Texel& texel = map_.texels[i];
       Work work{.sampler = TexelSampler(scene_.world, layout, map_, texel)};
       work.key = TexelKey(texel, options_.seed);
-      work.choice = lights.ForTexel(texel, work.sampler.radius());
+      work.choice = lights_->ForTexel(texel, work.sampler.radius());
       if (NoExplicitLight(work)) work.direct_active = false;
       work_.push_back(std::move(work));
     }
@@ -107,7 +108,7 @@ class TileGatherer {
 
   // The first round's rays say how much of the hemisphere meets back faces. A texel that turns out to lie partly or
   // wholly inside other geometry starts again from its valid parts, or not at all.
-  void Validate(Work& work) {
+  void Validate(const Texel& texel, Work& work) {
     const TexelValidity validity =
         ProbeValidity(scene_.world, work.key, work.backs / work.indirect.count(), work.sampler);
     counters_.validity_rays += validity.rays;
@@ -117,6 +118,8 @@ class TileGatherer {
     if (work.valid && !validity.pushed_out && work.sampler.valid_mask() == 0xffff) return;
     work.direct = work.indirect = {};
     work.group = {};
+    // A texel that was pushed out lies up to its diagonal away.
+    if (validity.pushed_out) work.choice = lights_->ForTexel(texel, 3 * work.sampler.radius());
     if (work.valid) RoundOf(work, 0, static_cast<uint32_t>(options_.min_samples));
   }
 
@@ -226,6 +229,7 @@ class TileGatherer {
   const uint32_t begin_, end_;
   const GatherOptions& options_;
   GatherCounters& counters_;
+  std::optional<TileLights> lights_;
   std::vector<Work> work_;
 };
 

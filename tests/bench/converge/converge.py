@@ -6,7 +6,7 @@ converge.py [--quick] [--scenes cornell office manylights] [--out FOLDER]
 Per row: CPU seconds, rays, relRMSE (against noise: the cross measure of two reference halves), p95, bias. Then the CPU seconds
 that each needs to reach 10, 5, 3, 2 and 1 % (interpolated on the log-log curve; beyond the curve's end along a slope of -1/2,
 marked ~), the ratio of the two, and the z-test of the path tracer against the reference. Writes table.md, results.json and
-plots (where matplotlib is installed)."""
+plots (where matplotlib is installed). BAKEWELL_PROGRAM names another program than build/release/bin/bakewell."""
 import argparse
 import json
 import math
@@ -61,7 +61,7 @@ class Scene:
 
 
 def run(command, level, folder, options):
-    words = [PROGRAM, command, level, "-o", folder, "--uv", "keep"] + options
+    words = [os.environ.get("BAKEWELL_PROGRAM", PROGRAM), command, level, "-o", folder, "--uv", "keep"] + options
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         sys.exit(" ".join(words) + "\n" + done.stderr)
@@ -105,7 +105,7 @@ def slope(rows):
 
 def budgets(quick):
     """Fixed sample counts, photons growing with them, so that the curve shows the estimator and not the stopping rule."""
-    counts = [16, 64, 256] if quick else [16, 32, 64, 128, 256, 512, 1024, 2048]
+    counts = [16, 64, 256] if quick else [16, 32, 64, 128, 256, 512, 1024]
     return [(f"bakewell N={n}", "bake", ["--target-error", "1e-9", "--samples", str(n), "--photons", str(4000 * n)]) for n in counts]
 
 
