@@ -17,7 +17,7 @@ struct QualityNumbers {
 QualityNumbers NumbersOf(Quality quality) {
   switch (quality) {
     case Quality::kPreview:
-      return {8, 32, 4, 0.12f};
+      return {8, 256, 6, 0.08f};
     case Quality::kMedium:
       return {16, 512, 24, 0.04f};
     case Quality::kHigh:

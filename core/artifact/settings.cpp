@@ -53,6 +53,9 @@ absl::Status CheckLight(const BakeSettings& settings) {
   if (settings.photon_batches < 1 || settings.photon_batches > kMostBatches) {
     return Refuse("photon_batches", "1 to 65536", settings.photon_batches);
   }
+  if (!(settings.footprint > 0 && settings.footprint <= 1)) {
+    return Refuse("footprint", "above 0 and at most 1", settings.footprint);
+  }
   if (!(settings.albedo_limit > 0 && settings.albedo_limit <= 1)) {
     return Refuse("albedo_limit", "above 0 and at most 1", settings.albedo_limit);
   }

@@ -1,6 +1,7 @@
 #include "core/scene/canonical.h"
 
 #include <algorithm>
+#include <compare>
 #include <map>
 #include <numeric>
 
@@ -26,15 +27,64 @@ std::vector<Digest> DigestsOf(const std::vector<T>& all, Of of) {
   return digests;
 }
 
-template <typename T>
-void SortByDigest(std::vector<T>& all, const std::vector<Digest>& digests) {
+template <typename T, typename Less>
+void SortIndices(std::vector<T>& all, Less less) {
   std::vector<size_t> order(all.size());
   std::iota(order.begin(), order.end(), size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return digests[a] < digests[b]; });
+  std::stable_sort(order.begin(), order.end(), less);
   std::vector<T> sorted;
   sorted.reserve(all.size());
   for (const size_t i : order) sorted.push_back(std::move(all[i]));
   all = std::move(sorted);
+}
+
+template <typename... T>
+std::strong_ordering Order(const Vec2<T...>& a, const Vec2<T...>& b) {
+  if (const auto x = std::strong_order(a.x, b.x); x != 0) return x;
+  return std::strong_order(a.y, b.y);
+}
+
+template <typename... T>
+std::strong_ordering Order(const Vec3<T...>& a, const Vec3<T...>& b) {
+  if (const auto x = std::strong_order(a.x, b.x); x != 0) return x;
+  if (const auto y = std::strong_order(a.y, b.y); y != 0) return y;
+  return std::strong_order(a.z, b.z);
+}
+
+std::strong_ordering Order(float a, float b) { return std::strong_order(a, b); }
+std::strong_ordering Order(uint32_t a, uint32_t b) { return a <=> b; }
+
+template <typename T>
+std::strong_ordering Order(const std::vector<T>& a, const std::vector<T>& b) {
+  if (a.size() != b.size()) return a.size() <=> b.size();
+  for (size_t i = 0; i < a.size(); ++i) {
+    if (const auto order = Order(a[i], b[i]); order != 0) return order;
+  }
+  return std::strong_ordering::equal;
+}
+
+// The first that is not equal, in the order given.
+template <typename... Orders>
+std::strong_ordering FirstOf(Orders... orders) {
+  std::strong_ordering result = std::strong_ordering::equal;
+  ((result = result == 0 ? orders() : result), ...);
+  return result;
+}
+
+// What stays when a level is moved, turned or scaled comes before what does not: materials have been compared.
+std::strong_ordering GeometryOrder(const Object& a, const Object& b) {
+  return FirstOf([&] { return a.lightmapped <=> b.lightmapped; }, [&] { return Order(a.density, b.density); },
+                 [&] { return Order(a.index, b.index); }, [&] { return Order(a.uv1, b.uv1); },
+                 [&] { return Order(a.uv0, b.uv0); }, [&] { return Order(a.position, b.position); },
+                 [&] { return Order(a.normal, b.normal); });
+}
+
+std::strong_ordering LightOrder(const PunctualLight& a, const PunctualLight& b) {
+  return FirstOf([&] { return a.type <=> b.type; }, [&] { return Order(a.cos_inner, b.cos_inner); },
+                 [&] { return Order(a.cos_outer, b.cos_outer); },
+                 [&] { return Order(a.angular_diameter_rad, b.angular_diameter_rad); },
+                 [&] { return Order(a.intensity, b.intensity); }, [&] { return Order(a.position, b.position); },
+                 [&] { return Order(a.direction, b.direction); }, [&] { return Order(a.tangent, b.tangent); });
 }
 
 // Numbers things by first use; equal content gets one number.
@@ -91,17 +141,12 @@ void Canonicalize(Scene& scene) {
   });
   const auto material_digests =
       DigestsOf(scene.materials, [&](const Material& material) { return MaterialDigest(material, texture_digests); });
-  const auto object_digests = DigestsOf(scene.objects, [&](const Object& object) {
-    return DigestOf([&](ByteWriter& writer) {
-      writer.Put(material_digests.at(object.material).bytes);
-      PutGeometry(writer, object);
-    });
+  SortIndices(scene.objects, [&](size_t a, size_t b) {
+    const Object &x = scene.objects[a], &y = scene.objects[b];
+    const Digest &of_x = material_digests.at(x.material), &of_y = material_digests.at(y.material);
+    return of_x == of_y ? GeometryOrder(x, y) < 0 : of_x < of_y;
   });
-  const auto light_digests = DigestsOf(scene.lights, [](const PunctualLight& light) {
-    return DigestOf([&](ByteWriter& writer) { PutLight(writer, light); });
-  });
-  SortByDigest(scene.objects, object_digests);
-  SortByDigest(scene.lights, light_digests);
+  SortIndices(scene.lights, [&](size_t a, size_t b) { return LightOrder(scene.lights[a], scene.lights[b]) < 0; });
   RenumberMaterials(scene, material_digests);
   RenumberTextures(scene, texture_digests);
 }

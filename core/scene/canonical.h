@@ -10,8 +10,10 @@
 
 namespace bakewell {
 
-// Sorts objects and lights by the digest of their content, and numbers materials and textures by first use (unused ones
-// are dropped, equal ones become one), so that the order of a file's nodes and meshes changes nothing that is baked.
+// Sorts objects and lights by their content, and numbers materials and textures by first use (unused ones are dropped,
+// equal ones become one), so that the order of a file's nodes and meshes changes nothing that is baked. Content is
+// compared by value, what a similarity keeps (material, triangles, UVs) before coordinates: a level that is scaled by a
+// power of two keeps its order, one that is moved or turned keeps it but for objects that differ in coordinates alone.
 // Names and sources do not count as content; equal objects keep their relative order.
 void Canonicalize(Scene& scene);
 

@@ -187,6 +187,23 @@ TEST(DirectLight, RectangleThatStandsUprightFollowsLambertsContourFormula) {
   EXPECT_LT(errors.rms, 1e-2);
 }
 
+// Symptom: texels whose first gather rays all missed a small light lost the share that the balance heuristic gave those
+// rays, 0.2 to 1 % of the light.
+TEST(DirectLight, SmallLightLosesNothingToAGatherThatStopsEarly) {
+  SceneBuilder builder = Floor();
+  const int emitter = builder.AddMaterial({0, 0, 0}, {400, 400, 400});
+  builder.AddQuad({-0.1, 3, -0.1}, {0.2, 0, 0}, {0, 0, 0.2}, {.material = emitter, .lightmapped = false});
+  const std::vector<Vec3d> corners = {{-0.1, 3, -0.1}, {0.1, 3, -0.1}, {0.1, 3, 0.1}, {-0.1, 3, 0.1}};
+  const Errors errors = Compare(
+      builder.Build(),
+      [&](Vec3d p) {
+        return 400 * PolygonIrradiance(corners, p, {0, 1, 0});
+      },
+      1024);
+  EXPECT_NEAR(errors.mean, 0, 2e-4);
+  EXPECT_LT(errors.rms, 1e-3);
+}
+
 TEST(DirectLight, DiscFollowsItsClosedForm) {
   SceneBuilder builder = Floor();
   const int emitter = builder.AddMaterial({0, 0, 0}, {4, 4, 4});

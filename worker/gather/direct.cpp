@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
 
@@ -73,7 +74,7 @@ class DirectAdder {
     ++counters_.shadow_rays;
     if (scene_.world.Occluded(ShadowRay(point.surface, sample, key))) return;
     const float light_pdf = sample.pdf * probability;
-    const float weight = sample.pdf > 0 ? light_pdf / (light_pdf + GatherPdf(cosine)) : 1.0f;
+    const float weight = sample.pdf > 0 ? PowerHeuristic(light_pdf, GatherPdf(cosine)) : 1.0f;
     const Rgb radiance_over_pdf = sample.perpendicular * (weight / probability);
     if (!IsFinite(radiance_over_pdf)) {
       ++counters_.bad_samples;
@@ -115,11 +116,12 @@ void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const T
       adder.Add(point, scene.lights.SampleLocal(light, point.surface.position, u.Get2(3)), drawn.probability, ray_key);
     }
     const SobolPoint far = far_set.At(i);
+    const TexelPoint under_sun = scene.lights.directionals().empty() ? point : sampler.AtMirrored(u.Get2(0));
     for (size_t k = 0; k < scene.lights.directionals().size(); ++k) {
       const Vec2f shift{UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k))),
                         UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k + 1)))};
       const Vec2f v = far.Get2(0) + (k == 0 ? Vec2f{} : shift);
-      adder.Add(point,
+      adder.Add(under_sun,
                 scene.lights.SampleDirectional(static_cast<int>(k), {v.x - std::floor(v.x), v.y - std::floor(v.y)}), 1,
                 ray_key);
     }

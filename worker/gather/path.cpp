@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "worker/sample/hash.h"
+#include "worker/sample/mis.h"
 #include "worker/sample/warp.h"
 
 namespace bakewell {
@@ -15,22 +16,20 @@ constexpr float kNearWidths = 1.5f;
 
 float Random(uint32_t key, uint32_t what) { return UnitFloat(HashCombine(key, what)); }
 
-float BalanceWeight(float pdf, float other) { return pdf + other > 0 ? pdf / (pdf + other) : 0; }
-
 // Light that a bounce direction finds by itself: emission and sky, weighted against SampleDirect.
 Rgb FoundLight(const GatherScene& scene, const SurfacePoint& from, Vec3f dir, const Hit& hit) {
   const float pdf = std::max(0.0f, Dot(dir, from.normal)) * kInvPiF;
   if (!hit) {
     const EnvironmentLight& sky = scene.lights.environment();
     if (!sky.bright()) return {};
-    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : BalanceWeight(pdf, sky.Pdf(dir)));
+    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : PowerHeuristic(pdf, sky.Pdf(dir)));
   }
   const int light = scene.lights.LightOfTriangle(hit.triangle);
   if (light < 0) return {};
   const Rgb emission = scene.world.EmissionAt(hit);
   if (MaxComponent(emission) <= 0) return {};
   const float light_pdf = scene.selector.Probability(light) * scene.lights.PdfLocal(light, from.position, dir, hit.t);
-  return emission * BalanceWeight(pdf, light_pdf);
+  return emission * PowerHeuristic(pdf, light_pdf);
 }
 
 Rgb Arriving(const GatherScene& scene, const SurfacePoint& point, const LightSample& sample, float probability,
@@ -40,7 +39,7 @@ Rgb Arriving(const GatherScene& scene, const SurfacePoint& point, const LightSam
   ++counters.shadow_rays;
   if (scene.world.Occluded(ShadowRay(point, sample, key))) return {};
   const float light_pdf = sample.pdf * probability;
-  const float weight = sample.pdf > 0 ? BalanceWeight(light_pdf, cosine * kInvPiF) : 1.0f;
+  const float weight = sample.pdf > 0 ? PowerHeuristic(light_pdf, cosine * kInvPiF) : 1.0f;
   return sample.perpendicular * (cosine * weight / probability);
 }
 

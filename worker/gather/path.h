@@ -30,7 +30,7 @@ struct GatheredRadiance {
 GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& hit, uint32_t key, GatherCounters& counters);
 
 // Direct irradiance at a surface point by light sampling: one local light chosen by flux, every directional light, the
-// sky where it is not smooth. With multiple importance sampling (balance heuristic) against a cosine lobe for lights
+// sky where it is not smooth. With multiple importance sampling (power heuristic) against a cosine lobe for lights
 // that a bounce can hit.
 Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters);
 

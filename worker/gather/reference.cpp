@@ -47,10 +47,11 @@ class PathTracer {
   PathTracer(const World& world, const LightSet& lights) : world_(world), lights_(lights), selector_(lights) {}
 
   // Irradiance estimate of one path that starts at `point`; dimensions 0..1 of bounce 0 belong to the caller.
-  Rgb Trace(SurfacePoint point, Frame frame, const PathNumbers& numbers) {
+  // Directional lights shine on `under_sun` (TexelSampler::AtMirrored) at the first surface.
+  Rgb Trace(SurfacePoint point, const SurfacePoint& under_sun, Frame frame, const PathNumbers& numbers) {
     Rgb irradiance, throughput{1, 1, 1};
     for (int bounce = 0;; ++bounce) {
-      irradiance += throughput * Direct(point, numbers, bounce);
+      irradiance += throughput * Direct(point, bounce == 0 ? under_sun : point, numbers, bounce);
       const Vec3f dir = frame.ToWorld(CosineHemisphere(numbers.Get2(bounce, 2)));
       ++rays_;
       const Hit hit = world_.Intersect({RayOrigin(point), dir, kInfinity, numbers.RayKey(bounce)});
@@ -68,7 +69,7 @@ class PathTracer {
   int64_t rays() const { return rays_; }
 
  private:
-  Rgb Direct(const SurfacePoint& point, const PathNumbers& numbers, int bounce) {
+  Rgb Direct(const SurfacePoint& point, const SurfacePoint& under_sun, const PathNumbers& numbers, int bounce) {
     Rgb irradiance;
     if (!selector_.empty()) {
       const auto choice = selector_.Pick(numbers.Get(bounce, 4));
@@ -78,8 +79,8 @@ class PathTracer {
     for (size_t i = 0; i < lights_.directionals().size(); ++i) {
       const uint32_t key = HashCombine(numbers.RayKey(bounce), static_cast<uint32_t>(i));
       irradiance += Arriving(
-          point, lights_.SampleDirectional(static_cast<int>(i), {UnitFloat(Hash(key)), UnitFloat(Hash(key + 1))}), 1,
-          key);
+          under_sun, lights_.SampleDirectional(static_cast<int>(i), {UnitFloat(Hash(key)), UnitFloat(Hash(key + 1))}),
+          1, key);
     }
     if (lights_.environment().bright() && !lights_.environment().smooth()) {
       const uint32_t key = HashCombine(numbers.RayKey(bounce), 0x5e4u);
@@ -132,7 +133,8 @@ ReferenceTexel TraceTexel(PathTracer& tracer, const TexelSampler& sampler, uint3
       const TexelPoint point = sampler.At(numbers.Get2(0, 0));
       if (!point.valid) continue;
       count += 1;
-      const Rgb sample = tracer.Trace(point.surface, point.frame, numbers);
+      const Rgb sample =
+          tracer.Trace(point.surface, sampler.AtMirrored(numbers.Get2(0, 0)).surface, point.frame, numbers);
       if (IsFinite(sample)) mean[r] += sample;
     }
     if (count > 0) mean[r] = mean[r] / count;
@@ -161,7 +163,7 @@ std::vector<ReferenceTexel> TraceReference(const World& world, const LightSet& l
     for (uint32_t i = map.tile_begin[tile]; i < map.tile_begin[tile + 1]; ++i) {
       TexelSampler sampler(world, layout, map, map.texels[i]);
       const uint32_t key = TexelKey(map.texels[i], HashCombine(seed, 0x4ef0u));
-      result[i].valid = ProbeValidity(world, key, sampler).valid;
+      result[i].valid = ProbeValidity(world, key, std::nullopt, sampler).valid;
       if (!result[i].valid) continue;
       result[i] = TraceTexel(tracer, sampler, key, samples);
     }

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "worker/gather/direct.h"
+#include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
 #include "worker/texel/validity.h"
@@ -19,7 +20,7 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Ve
   if (!hit) {
     const EnvironmentLight& sky = scene.lights.environment();
     if (!sky.bright()) return {};
-    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : pdf / (pdf + sky.Pdf(dir)));
+    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : PowerHeuristic(pdf, sky.Pdf(dir)));
   }
   const int light = scene.lights.LightOfTriangle(hit.triangle);
   if (light < 0) return {};
@@ -27,7 +28,7 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Ve
   if (MaxComponent(emission) <= 0) return {};
   const float chosen = choice.empty() ? 0 : choice.probability_of_light[light];
   const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from, dir, hit.t) : 0;
-  return emission * (pdf / (pdf + light_pdf));
+  return emission * PowerHeuristic(pdf, light_pdf);
 }
 
 // Everything about one texel while its tile is in flight.
@@ -36,7 +37,7 @@ struct Work {
   TileLights::Choice choice{};
   uint32_t key = 0;
   bool valid = true;
-  float backface_share = 0;
+  float backs = 0, backface_share = 0;  // gather rays that met a back face; their share
   bool direct_active = true, indirect_active = true;
   Accumulator direct{}, indirect{};
   std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
@@ -51,8 +52,11 @@ class TileGatherer {
 
   std::vector<TexelLight> Run(const AtlasLayout& layout) {
     Prepare(layout);
-    for (int done = 0, planned = options_.min_samples; planned <= options_.max_samples; done = planned, planned *= 2) {
-      if (!Round(static_cast<uint32_t>(done), static_cast<uint32_t>(planned))) break;
+    Round(0, static_cast<uint32_t>(options_.min_samples));
+    for (Work& work : work_) Validate(work);
+    Decide();
+    for (int done = options_.min_samples; done < options_.max_samples; done *= 2) {
+      if (!Round(static_cast<uint32_t>(done), static_cast<uint32_t>(2 * done))) break;
       Decide();
     }
     std::vector<TexelLight> result;
@@ -69,11 +73,6 @@ class TileGatherer {
       const Texel& texel = map_.texels[i];
       Work work{.sampler = TexelSampler(scene_.world, layout, map_, texel)};
       work.key = TexelKey(texel, options_.seed);
-      const TexelValidity validity = ProbeValidity(scene_.world, work.key, work.sampler);
-      counters_.validity_rays += validity.rays;
-      work.valid = validity.valid;
-      work.backface_share = validity.backface_share;
-      work.direct_active = work.indirect_active = validity.valid;
       work.choice = lights.ForTexel(texel, work.sampler.radius());
       if (NoExplicitLight(work)) work.direct_active = false;
       work_.push_back(std::move(work));
@@ -88,20 +87,37 @@ class TileGatherer {
   // Samples [done, planned) of every active texel. False when none was active.
   bool Round(uint32_t done, uint32_t planned) {
     bool any = false;
-    for (Work& work : work_) {
-      if (work.direct_active) {
-        if (done > 0) work.direct.Double();
-        GatherDirect(scene_, work.sampler, work.choice, work.key, done, planned, work.direct, counters_);
-        work.direct_samples = static_cast<int>(planned);
-      }
-      if (work.indirect_active) {
-        if (done > 0) work.indirect.Double();
-        GatherIndirect(work, done, planned);
-        work.indirect_samples = static_cast<int>(planned);
-      }
-      any |= work.direct_active || work.indirect_active;
-    }
+    for (Work& work : work_) any |= RoundOf(work, done, planned);
     return any;
+  }
+
+  bool RoundOf(Work& work, uint32_t done, uint32_t planned) {
+    if (work.direct_active) {
+      if (done > 0) work.direct.Double();
+      GatherDirect(scene_, work.sampler, work.choice, work.key, done, planned, work.direct, counters_);
+      work.direct_samples = static_cast<int>(planned);
+    }
+    if (work.indirect_active) {
+      if (done > 0) work.indirect.Double();
+      GatherIndirect(work, done, planned);
+      work.indirect_samples = static_cast<int>(planned);
+    }
+    return work.direct_active || work.indirect_active;
+  }
+
+  // The first round's rays say how much of the hemisphere meets back faces. A texel that turns out to lie partly or
+  // wholly inside other geometry starts again from its valid parts, or not at all.
+  void Validate(Work& work) {
+    const TexelValidity validity =
+        ProbeValidity(scene_.world, work.key, work.backs / work.indirect.count(), work.sampler);
+    counters_.validity_rays += validity.rays;
+    work.valid = validity.valid;
+    work.backface_share = validity.backface_share;
+    if (!work.valid) work.direct_active = work.indirect_active = false;
+    if (work.valid && !validity.pushed_out && work.sampler.valid_mask() == 0xffff) return;
+    work.direct = work.indirect = {};
+    work.group = {};
+    if (work.valid) RoundOf(work, 0, static_cast<uint32_t>(options_.min_samples));
   }
 
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
@@ -117,6 +133,7 @@ class TileGatherer {
       const uint32_t ray_key = HashCombine(work.key, 0x80000000u | i);
       ++counters_.gather_rays;
       const Hit hit = scene_.world.Intersect({RayOrigin(point.surface), dir, kInfinity, ray_key});
+      work.backs += MeetsBack(scene_.world, hit) ? 1.0f : 0.0f;
       Rgb radiance = FoundByGather(scene_, work.choice, point.surface.position, dir, pdf, hit);
       if (hit) {
         const GatheredRadiance reflected = ReflectedRadiance(scene_, hit, ray_key, counters_);

@@ -189,8 +189,10 @@ float LightSet::Importance(int light, Vec3f position, Vec3f normal, float radius
   const float distance2 = Dot(to_light, to_light) + radius * radius;
   const float distance = std::sqrt(distance2);
   if (!(distance > 0)) return 0;
-  const float falloff =
-      WidenedFalloff(punctual, -Dot(to_light, punctual.direction) / distance, std::min(1.0f, radius / distance));
+  const float to_center = Length(to_light);
+  const float falloff = radius >= to_center ? 1.0f
+                                            : WidenedFalloff(punctual, -Dot(to_light, punctual.direction) / to_center,
+                                                             radius / to_center);
   return Luminance(punctual.intensity) * falloff * SurfaceCosine(Dot(to_light, normal) + radius, distance, normal) /
          distance2;
 }

@@ -10,13 +10,13 @@ class SphericalTriangle {
  public:
   // a, b, c: unit directions to the corners.
   SphericalTriangle(Vec3f a, Vec3f b, Vec3f c);
-  float solid_angle() const { return solid_angle_; }  // [sr], >= 0
+  float solid_angle() const { return static_cast<float>(solid_angle_); }  // [sr], >= 0
   // Unit direction, density 1/solid_angle per steradian.
   Vec3f Draw(Vec2f u) const;
 
  private:
   Vec3f a_, b_, c_;
-  float solid_angle_ = 0;
+  double solid_angle_ = 0;
 };
 
 }  // namespace bakewell

@@ -19,7 +19,9 @@ Distribution1D::Distribution1D(std::span<const float> weights) : cdf_(weights.si
 Distribution1D::Sample Distribution1D::Draw(float u) const {
   const auto above = std::upper_bound(cdf_.begin(), cdf_.end(), static_cast<double>(u));
   int index = std::clamp(static_cast<int>(above - cdf_.begin()) - 1, 0, size() - 1);
-  while (index > 0 && cdf_[index + 1] <= cdf_[index]) --index;
+  // Cells whose probability is zero, or so small that single precision has no number for it, are not drawn.
+  while (index > 0 && Probability(index) <= 0) --index;
+  while (index + 1 < size() && Probability(index) <= 0) ++index;
   const double probability = cdf_[index + 1] - cdf_[index];
   const double remainder = probability > 0 ? (static_cast<double>(u) - cdf_[index]) / probability : 0.0;
   return {index, static_cast<float>(probability), std::clamp(static_cast<float>(remainder), 0.0f, 0x1.fffffep-1f)};

@@ -41,20 +41,19 @@ void TexelSampler::AddFragment(const World& world, const AtlasLayout& layout, co
   if (polygon.count < 3 || area <= 0) return;
   const PageToWorld map = MapOf(t, corners);
   AddSide(world, fragment.triangle, map.per_x, map.per_y);
-  const auto add = [&](Vec2d a, Vec2d b, Vec2d c, Shape shape, double share) {
+  const auto add = [&](Vec2d a, Vec2d b, Vec2d c, bool whole, double share) {
     const float before = parts_.empty() ? 0.0f : parts_.back().cdf;
     const Vec3d p = map.At(a);
     parts_.push_back({ToFloat(p), ToFloat(map.At(b) - p), ToFloat(map.At(c) - p), ToUnit(a, texel),
-                      ToUnit(b, texel) - ToUnit(a, texel), ToUnit(c, texel) - ToUnit(a, texel), shape,
+                      ToUnit(b, texel) - ToUnit(a, texel), ToUnit(c, texel) - ToUnit(a, texel), whole,
                       static_cast<uint16_t>(sides_.size() - 1), before + static_cast<float>(share)});
   };
   if (area > window.side * window.side * (1 - 1e-6)) {
-    return add(window.corner, window.corner + Vec2d{window.side, 0}, window.corner + Vec2d{0, window.side},
-               Shape::kSquare, area);
+    return add(window.corner, window.corner + Vec2d{window.side, 0}, window.corner + Vec2d{0, window.side}, true, area);
   }
   for (int i = 1; i + 1 < polygon.count; ++i) {
     const Vec2d a = polygon.corner[0], b = polygon.corner[i], c = polygon.corner[i + 1];
-    add(a, b, c, Shape::kTriangle, 0.5 * std::fabs(Cross(b - a, c - a)));
+    add(a, b, c, false, 0.5 * std::fabs(Cross(b - a, c - a)));
   }
 }
 
@@ -77,48 +76,47 @@ float Mirror(float x, float max) {
 
 }  // namespace
 
-bool TexelSampler::AddMirrored(const World& world, const AtlasLayout& layout, const TexelFragment& fragment,
+void TexelSampler::AddMirrored(const World& world, const AtlasLayout& layout, const TexelFragment& fragment,
                                const Window& window, Vec2d texel) {
   const Triangle& t = world.triangles()[fragment.triangle];
   const auto c = TexelCorners(world, layout, fragment.triangle);
   const Vec2d a = c[0] - c[2], b = c[1] - c[2], to_center = texel + Vec2d{0.5, 0.5} - c[2];
   const double det = Cross(a, b);
-  if (det == 0) return false;
+  if (det == 0) return;
   const Vec2d center{Cross(to_center, b) / det, Cross(a, to_center) / det};
-  if (center.x < 0 || center.y < 0 || center.x + center.y > 1) return false;
+  if (center.x < 0 || center.y < 0 || center.x + center.y > 1) return;
   const ConvexPolygon inside = ClipToSquare({3, {c[0], c[1], c[2]}}, window.corner, window.side);
   const double share = std::fabs(inside.SignedArea()) / (window.side * window.side);
-  if (share < kMirroredShare) return false;
-  if (share > 1 - 1e-6) {
-    AddFragment(world, layout, fragment, window, texel);
-    return true;
-  }
+  if (share < kMirroredShare || share > 1 - 1e-6) return;
   const PageToWorld map = MapOf(t, c);
   AddSide(world, fragment.triangle, map.per_x, map.per_y);
   const auto narrow = [](double x, double y) { return Vec2f{static_cast<float>(x), static_cast<float>(y)}; };
-  Part part{
-      t.p0 + t.e2, -t.e2, t.e1 - t.e2, ToUnit(c[2], texel), ToUnit(c[0], c[2]), ToUnit(c[1], c[2]), Shape::kMirrored,
-      0,           1};
-  part.center = narrow(center.x, center.y);
-  part.dx = narrow(window.side * b.y / det, -window.side * a.y / det);
-  part.dy = narrow(-window.side * b.x / det, window.side * a.x / det);
-  parts_.push_back(part);
-  return true;
+  const Part triangle{t.p0 + t.e2,
+                      -t.e2,
+                      t.e1 - t.e2,
+                      ToUnit(c[2], texel),
+                      ToUnit(c[0], c[2]),
+                      ToUnit(c[1], c[2]),
+                      false,
+                      static_cast<uint16_t>(sides_.size() - 1),
+                      1};
+  mirrored_ =
+      MirroredPart{triangle, narrow(center.x, center.y), narrow(window.side * b.y / det, -window.side * a.y / det),
+                   narrow(-window.side * b.x / det, window.side * a.x / det)};
 }
 
 TexelSampler::TexelSampler(const World& world, const AtlasLayout& layout, const TexelMap& map, const Texel& texel) {
   const Vec2d corner{static_cast<double>(texel.x), static_cast<double>(texel.y)};
   const double inset = 0.5 - 0.5 * static_cast<double>(map.footprint);
   const Window footprint{corner + Vec2d{inset, inset}, map.footprint};
-  for (uint32_t f = texel.fragment_begin; f < texel.fragment_end && parts_.empty(); ++f) {
-    AddMirrored(world, layout, map.fragments[f], footprint, corner);
-  }
-  const bool mirrored = !parts_.empty();
   for (const Window& window : {footprint, Window{corner, 1}}) {
-    for (uint32_t f = texel.fragment_begin; f < texel.fragment_end && !mirrored; ++f) {
+    for (uint32_t f = texel.fragment_begin; f < texel.fragment_end; ++f) {
       AddFragment(world, layout, map.fragments[f], window, corner);
     }
     if (!parts_.empty()) break;
+  }
+  for (uint32_t f = texel.fragment_begin; f < texel.fragment_end && !mirrored_; ++f) {
+    AddMirrored(world, layout, map.fragments[f], footprint, corner);
   }
   BAKEWELL_CHECK(!parts_.empty());
   const float total = parts_.back().cdf;
@@ -141,18 +139,18 @@ TexelSampler::Place TexelSampler::Find(Vec2f u) const {
   const float begin = k == 0 ? 0 : parts_[k - 1].cdf;
   const float width = parts_[k].cdf - begin;
   const Vec2f within{width > 0 ? std::clamp((u.x - begin) / width, 0.0f, 0x1.fffffep-1f) : 0.5f, u.y};
-  const Part& part = parts_[k];
-  if (part.shape == Shape::kSquare) return {&part, within};
-  if (part.shape == Shape::kTriangle) return {&part, TriangleFromSquare(within)};
-  const Vec2f b = part.center + part.dx * (within.x - 0.5f) + part.dy * (within.y - 0.5f);
+  return {&parts_[k], parts_[k].whole ? within : TriangleFromSquare(within)};
+}
+
+TexelSampler::Place TexelSampler::FindMirrored(Vec2f u) const {
+  const Vec2f b = mirrored_->center + mirrored_->dx * (u.x - 0.5f) + mirrored_->dy * (u.y - 0.5f);
   const float first = Mirror(b.x, 1);
-  return {&part, {first, Mirror(b.y, 1 - first)}};
+  return {&mirrored_->triangle, {first, Mirror(b.y, 1 - first)}};
 }
 
 int TexelSampler::BitAt(Vec2f u) const { return MaskBit(Find(u)); }
 
-TexelPoint TexelSampler::At(Vec2f u) const {
-  const Place place = Find(u);
+TexelPoint TexelSampler::PointAt(Place place) const {
   const Part& part = *place.part;
   const Side& side = sides_[part.side];
   TexelPoint point;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "worker/texel/texels.h"
@@ -13,17 +14,19 @@ struct TexelPoint {
   bool valid = true;  // false inside other geometry: the sample does not count
 };
 
-// Draws points over the footprint of one texel: the square of side TexelMap::footprint about its centre. Where a
-// triangle lies under the centre and holds a good part of the footprint, what leaves that triangle is mirrored back
-// into it: one normal, and the rule of the reference. Otherwise the footprint's (or, where that is empty, the texel's)
-// covered part is drawn from uniformly.
+// Draws points uniformly over the covered part of one texel's footprint: the square of side TexelMap::footprint about
+// its centre, or all of the texel where the footprint holds no surface.
 class TexelSampler {
  public:
   TexelSampler(const World& world, const AtlasLayout& layout, const TexelMap& map, const Texel& texel);
 
-  // Points in the parts that `valid_mask` rules out come back with valid ==
+  // Pdf 1/(covered area of the footprint). Points in the parts that `valid_mask` rules out come back with valid ==
   // false.
-  TexelPoint At(Vec2f u) const;
+  TexelPoint At(Vec2f u) const { return PointAt(Find(u)); }
+  // The reference's rule, for the hard edges of directional lights: a footprint that leaves the triangle under the
+  // texel's centre is mirrored back into it in barycentric coordinates, where that triangle holds a good part of it;
+  // else At(u).
+  TexelPoint AtMirrored(Vec2f u) const { return mirrored_ ? PointAt(FindMirrored(u)) : At(u); }
   // The bit of valid_mask that decides about At(u).
   int BitAt(Vec2f u) const;
 
@@ -36,15 +39,18 @@ class TexelSampler {
   float radius() const { return radius_; }
 
  private:
-  enum class Shape : uint8_t { kSquare, kTriangle, kMirrored };
-  // A parallelogram (the whole footprint), a triangle of a clipped polygon's fan, or the triangle under the centre.
+  // A parallelogram (the whole footprint) or a triangle of a clipped polygon's fan.
   struct Part {
     Vec3f p0, e1, e2;   // [m]
     Vec2f uv0, d1, d2;  // in the texel's square, [0,1]
-    Shape shape = Shape::kTriangle;
-    uint16_t side = 0;           // index into sides_
-    float cdf = 0;               // share of the coverage up to and with this part
-    Vec2f center{}, dx{}, dy{};  // mirrored: barycentrics of the centre, and across the footprint
+    bool whole = false;
+    uint16_t side = 0;  // index into sides_
+    float cdf = 0;      // share of the coverage up to and with this part
+  };
+  // The triangle under the centre: barycentrics of the centre, and across the footprint.
+  struct MirroredPart {
+    Part triangle;
+    Vec2f center, dx, dy;
   };
   struct Side {
     Frame frame;
@@ -55,6 +61,8 @@ class TexelSampler {
     Vec2f b;
   };
   Place Find(Vec2f u) const;
+  Place FindMirrored(Vec2f u) const;
+  TexelPoint PointAt(Place place) const;
   static int MaskBit(Place place);
   struct Window {
     Vec2d corner;
@@ -63,11 +71,12 @@ class TexelSampler {
   void AddFragment(const World& world, const AtlasLayout& layout, const TexelFragment& fragment, const Window& window,
                    Vec2d texel);
 
-  bool AddMirrored(const World& world, const AtlasLayout& layout, const TexelFragment& fragment, const Window& window,
+  void AddMirrored(const World& world, const AtlasLayout& layout, const TexelFragment& fragment, const Window& window,
                    Vec2d texel);
   void AddSide(const World& world, uint32_t triangle, Vec3d per_x, Vec3d per_y);
 
   std::vector<Part> parts_;
+  std::optional<MirroredPart> mirrored_;
   std::vector<Side> sides_;
   uint16_t valid_mask_ = 0xffff;
   bool moved_ = false;

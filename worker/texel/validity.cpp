@@ -9,11 +9,7 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr int kFirstRays = 8, kInsideRays = 16, kPlaces = 16;
-
-bool MeetsBack(const World& world, const Hit& hit) {
-  return hit && hit.back && !world.MaterialOf(world.triangles()[hit.triangle]).double_sided;
-}
+constexpr int kFirstRays = 8, kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
 
 // Share of `count` cosine-weighted rays that meet a back face first.
 float BackShare(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, int count,
@@ -45,7 +41,8 @@ uint16_t ProbeMask(const World& world, const TexelSampler& sampler, const SobolS
   for (int i = 0; i < kPlaces; ++i) {
     const Vec2f u{(static_cast<float>(i % 4) + 0.5f) / 4, (static_cast<float>(i / 4) + 0.5f) / 4};
     const TexelPoint point = sampler.At(u);
-    const float share = BackShare(world, point.surface, point.frame, set, kInsideRays, result.rays);
+    float share = BackShare(world, point.surface, point.frame, set, kPlaceRays, result.rays);
+    if (share > 0) share = BackShare(world, point.surface, point.frame, set, kInsideRays, result.rays);
     backs += share;
     const uint16_t bit = static_cast<uint16_t>(1U << sampler.BitAt(u));
     tested |= bit;
@@ -75,12 +72,17 @@ bool PushOut(const World& world, TexelSampler& sampler, const SobolSet& set, Tex
 
 }  // namespace
 
-TexelValidity ProbeValidity(const World& world, uint32_t key, TexelSampler& sampler) {
+bool MeetsBack(const World& world, const Hit& hit) {
+  return hit && hit.back && !world.MaterialOf(world.triangles()[hit.triangle]).double_sided;
+}
+
+TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<float> known_share, TexelSampler& sampler) {
   TexelValidity result;
   if (world.backfaces() == BackfaceMode::kPass) return result;
   const SobolSet set(HashCombine(key, 0x7a11du));
   const TexelPoint center = sampler.At({0.5f, 0.5f});
-  result.backface_share = BackShare(world, center.surface, center.frame, set, kFirstRays, result.rays);
+  result.backface_share =
+      known_share ? *known_share : BackShare(world, center.surface, center.frame, set, kFirstRays, result.rays);
   if (result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) return result;
   const uint16_t mask = ProbeMask(world, sampler, set, result);
   if (mask != 0) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "worker/texel/sampler.h"
 
 namespace bakewell {
@@ -14,8 +16,12 @@ struct TexelValidity {
 
 // Finds the parts of a texel that lie inside other geometry (more than half of their hemisphere meets the back of a
 // single-sided surface first) and rules them out in the sampler's mask; a texel that is wholly inside is moved past a
-// back face within its own diagonal, if that helps. Only texels whose first few rays meet a back face or something
-// within the texel pay for more. With BackfaceMode::kPass nothing has a back.
-TexelValidity ProbeValidity(const World& world, uint32_t key, TexelSampler& sampler);
+// back face within its own diagonal, if that helps. Texels whose first rays meet no back face, and that have nothing
+// standing within their own reach, cost no more than those rays. `known_share`: share of back faces that rays of the
+// caller's met already; without it eight rays find out. With BackfaceMode::kPass nothing has a back.
+TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<float> known_share, TexelSampler& sampler);
+
+// Whether a ray's first hit is the back of a single-sided surface.
+bool MeetsBack(const World& world, const Hit& hit);
 
 }  // namespace bakewell

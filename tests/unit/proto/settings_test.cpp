@@ -23,6 +23,7 @@ BakeSettings Unusual() {
   settings.photons = int64_t{5} << 32;
   settings.photon_batches = 64;
   settings.albedo_limit = 0.9f;
+  settings.footprint = 0.75f;
   settings.seed = 0xffffffff;
   Environment& environment = settings.environment.emplace();
   environment.type = EnvironmentType::kGradient;
@@ -38,6 +39,7 @@ TEST(Settings, JsonBringsEveryFieldBack) {
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_EQ(read->uv, UvMode::kGenerate);
   EXPECT_EQ(read->albedo_limit, 0.9f);
+  EXPECT_EQ(read->footprint, 0.75f);
   EXPECT_EQ(read->photons, int64_t{5} << 32);
   EXPECT_EQ(read->environment->horizon.y, 0.2f);
   EXPECT_EQ(SettingsJson(*read), json);  // and so all others

@@ -1,0 +1,178 @@
+#!/usr/bin/python3
+"""Time against error on the scenes of ../shared/reference: bakewell at several budgets, and its own path tracer.
+
+converge.py [--quick] [--scenes cornell office manylights] [--out FOLDER]
+
+Per row: CPU seconds, rays, relRMSE (against noise: the cross measure of two reference halves), p95, bias. Then the CPU seconds
+that each needs to reach 10, 5, 3, 2 and 1 % (interpolated on the log-log curve; beyond the curve's end along a slope of -1/2,
+marked ~), the ratio of the two, and the z-test of the path tracer against the reference. Writes table.md, results.json and
+plots (where matplotlib is installed)."""
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+import OpenImageIO as oiio
+
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
+REFERENCE = os.path.join(ROOT, "..", "shared", "reference")
+PROGRAM = os.path.join(ROOT, "build", "release", "bin", "bakewell")
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+TARGETS = (0.10, 0.05, 0.03, 0.02, 0.01)
+
+
+def load(path):
+    pixels = oiio.ImageBuf(path).get_pixels(oiio.FLOAT)
+    if pixels is None or pixels.size == 0:
+        sys.exit("cannot read " + path)
+    return pixels.astype(np.float64)
+
+
+class Scene:
+    def __init__(self, name):
+        self.name = name
+        at = lambda *parts: os.path.join(REFERENCE, *parts)
+        self.level = at("scenes", name + ".glb")
+        self.mask = (load(at("masks", name + ".png"))[..., 0] > 0.99) & (load(at("masks", name + "_backface.exr"))[..., 0] < 0.02)
+        self.mean, self.a, self.b = [load(at("reference", name + suffix + ".exr"))[..., :3] @ LUMINANCE for suffix in ("", "_A", "_B")]
+        self.stderr = load(at("reference", name + "_stderr.exr"))[..., 0]
+
+    def figures(self, path):
+        value = (load(path)[..., :3] @ LUMINANCE)[self.mask]
+        a, b, mean = self.a[self.mask], self.b[self.mask], self.mean[self.mask]
+        m = mean.mean()
+        return {
+            "relRMSE": math.sqrt(max(((value - a) * (value - b)).mean(), 0)) / m,
+            "p95": float(np.percentile(np.abs(value - mean) / (mean + 0.01 * m), 95)),
+            "bias": float(value.mean() / m - 1),
+        }
+
+    def z_test(self, folder):
+        """Squared z-scores of a path-traced reference against the other: their median, which is 0.455 for standard normal ones."""
+        value = load(os.path.join(folder, "reference-0.irradiance.exr"))[..., :3] @ LUMINANCE
+        error = load(os.path.join(folder, "reference-0.stderr.exr"))[..., 0]
+        variance = (error ** 2 + self.stderr ** 2)[self.mask]
+        z = (value - self.mean)[self.mask][variance > 0] / np.sqrt(variance[variance > 0])
+        return {"median_z2": float(np.median(z ** 2)), "mean_z": float(z.mean()), "beyond_3": float((np.abs(z) > 3).mean())}
+
+
+def run(command, level, folder, options):
+    words = [PROGRAM, command, level, "-o", folder, "--uv", "keep"] + options
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit(" ".join(words) + "\n" + done.stderr)
+    statistics = json.load(open(os.path.join(folder, "manifest.json"), encoding="utf-8"))["statistics"]
+    cpu = sum(phase["cpu_seconds"] for phase in statistics["phases"])
+    return {"cpu_s": cpu, "rays": statistics["rays"], "estimated": statistics["estimated_error"]}
+
+
+def measure(scene, label, command, options, keep=None):
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = keep or temporary
+        row = {"scene": scene.name, "who": label, **run(command, scene.level, folder, options)}
+        image = "lightmap-0.irradiance.exr" if command == "bake" else "reference-0.irradiance.exr"
+        row.update(scene.figures(os.path.join(folder, image)))
+        if command == "reference":
+            row["z"] = scene.z_test(folder)
+    print(format_row(row), flush=True)
+    return row
+
+
+def format_row(r):
+    return (f"| {r['scene']} | {r['who']} | {r['cpu_s']:.2f} | {r['rays'] / 1e6:.1f} | {100 * r['relRMSE']:.2f} | "
+            f"{100 * r['p95']:.1f} | {100 * r['bias']:+.2f} | {100 * r['estimated']:.2f} |")
+
+
+def seconds_to(rows, target):
+    """CPU seconds to an error on a curve of rows, and whether that lies outside it."""
+    points = sorted((r["cpu_s"], r["relRMSE"]) for r in rows)
+    for (t0, e0), (t1, e1) in zip(points, points[1:]):
+        if e0 >= target >= e1 and e0 > e1:
+            share = math.log(e0 / target) / math.log(e0 / e1)
+            return t0 * (t1 / t0) ** share, False
+    t, e = points[-1] if points[-1][1] > target else points[0]
+    return t * (e / target) ** 2, True
+
+
+def slope(rows):
+    points = np.array([(math.log(r["rays"]), math.log(r["relRMSE"])) for r in rows])
+    return float(np.polyfit(points[:, 0], points[:, 1], 1)[0])
+
+
+def budgets(quick):
+    """Fixed sample counts, photons growing with them, so that the curve shows the estimator and not the stopping rule."""
+    counts = [16, 64, 256] if quick else [16, 32, 64, 128, 256, 512, 1024, 2048]
+    return [(f"bakewell N={n}", "bake", ["--target-error", "1e-9", "--samples", str(n), "--photons", str(4000 * n)]) for n in counts]
+
+
+def bench_scene(name, quick):
+    scene = Scene(name)
+    fixed = [measure(scene, *budget) for budget in budgets(quick)]
+    qualities = [measure(scene, f"bakewell {q}", "bake", ["--quality", q]) for q in ("preview", "medium", "high")]
+    paths = [measure(scene, f"reference {n} spp", "reference", ["--spp", str(n)]) for n in ((64, 256) if quick else (64, 256, 1024))]
+    return {"fixed": fixed, "quality": qualities, "reference": paths}
+
+
+def table(results):
+    lines = ["| scene | who | CPU s | Mrays | relRMSE % | p95 % | bias % | own estimate % |", "|---|---|---|---|---|---|---|---|"]
+    for groups in results.values():
+        lines += [format_row(r) for rows in groups.values() for r in rows]
+    lines += ["", "CPU seconds to an error (~: extrapolated along a slope of -1/2), and path tracer / bakewell:", "",
+              "| scene | error | bakewell, fixed N | bakewell, qualities | path tracer | ratio |", "|---|---|---|---|---|---|"]
+    for name, groups in results.items():
+        for target in TARGETS:
+            cells = [seconds_to(groups[g], target) for g in ("fixed", "quality", "reference")]
+            text = [("~" if outside else "") + f"{t:.2f}" for t, outside in cells]
+            best = min([t for t, outside in cells[:2] if not outside] or [cells[1][0]])
+            lines.append(f"| {name} | {100 * target:.0f} % | {text[0]} | {text[1]} | {text[2]} | {cells[2][0] / best:.0f} |")
+    lines += ["", "Slope of log error over log rays at fixed N (-0.5 is Monte Carlo), and the path tracer's z-scores against the reference "
+              "(median of z^2: 0.455 where both standard errors are right; above 3: 0.27 %):", "", "| scene | slope | median z^2 | mean z | beyond 3 |", "|---|---|---|---|---|"]
+    for name, groups in results.items():
+        z = groups["reference"][-1]["z"]
+        lines.append(f"| {name} | {slope(groups['fixed']):.2f} | {z['median_z2']:.3f} | {z['mean_z']:+.3f} | {100 * z['beyond_3']:.2f} % |")
+    return "\n".join(lines) + "\n"
+
+
+def plot(results, folder):
+    try:
+        import matplotlib
+        matplotlib.use("Agg")
+        import matplotlib.pyplot as plt
+    except ImportError:
+        print("no plots: python3-matplotlib is not installed")
+        return
+    figure, axes = plt.subplots(1, len(results), figsize=(5 * len(results), 4), squeeze=False)
+    for axis, (name, groups) in zip(axes[0], results.items()):
+        for label, rows in (("bakewell, fixed N", groups["fixed"]), ("bakewell, qualities", groups["quality"]), ("path tracer", groups["reference"])):
+            axis.loglog([r["cpu_s"] for r in rows], [r["relRMSE"] for r in rows], "o-", label=label)
+        axis.set(title=name, xlabel="CPU seconds", ylabel="relRMSE (cross)")
+        axis.grid(True, which="both", alpha=0.3)
+        axis.legend()
+    figure.tight_layout()
+    figure.savefig(os.path.join(folder, "converge.png"), dpi=80)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer budgets, some minutes in all")
+    parser.add_argument("--scenes", nargs="+", default=["cornell", "office", "manylights"])
+    parser.add_argument("--out", default=os.path.join(ROOT, "build", "bench", "converge"))
+    arguments = parser.parse_args()
+    os.makedirs(arguments.out, exist_ok=True)
+    results = {name: bench_scene(name, arguments.quick) for name in arguments.scenes}
+    text = table(results)
+    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False).stdout.strip()
+    with open(os.path.join(arguments.out, "table.md"), "w", encoding="utf-8") as file:
+        file.write(f"Commit {commit}, {os.cpu_count()} threads, seed 0.\n\n" + text)
+    with open(os.path.join(arguments.out, "results.json"), "w", encoding="utf-8") as file:
+        json.dump({"commit": commit, "results": results}, file, indent=1)
+    plot(results, arguments.out)
+    print(text + "\nwritten to " + arguments.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,78 @@
+#include "worker/texel/validity.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "tests/support/bake_scene.h"
+#include "tests/support/scene_builder.h"
+
+namespace bakewell {
+namespace {
+
+// A floor of 8 x 8 m and as many texels: page (x, y) is world (x, 0, -y). A box without a lightmap stands in it.
+Scene FloorWithBox(double x0, double x1, double z0, double z1) {
+  SceneBuilder builder({8, 8});
+  builder.AddQuad({0, 0, 0}, {8, 0, 0}, {0, 0, -8}, {.page = {0, 0, 8, 8}});
+  builder.AddBox({x0, -0.5, -z1}, {x1, 2, -z0}, {.lightmapped = false});
+  return builder.Build();
+}
+
+struct Probed {
+  TexelValidity validity;
+  uint16_t mask;
+};
+
+Probed Probe(const Scene& scene, int x, int y, BackfaceMode mode = BackfaceMode::kReflect) {
+  BakeSettings settings;
+  settings.footprint = 1;
+  settings.backfaces = mode;
+  const PreparedLevel prepared = PrepareInMemory(scene, settings);
+  const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * y + x)]];
+  TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
+  const TexelValidity validity = ProbeValidity(*prepared.world, 1, std::nullopt, sampler);
+  return {validity, sampler.valid_mask()};
+}
+
+TEST(ProbeValidity, TexelDeepUnderABoxIsInvalid) {
+  // The box's sides are 2.5 m from the texel's centre, its diagonal is 1.4 m.
+  const Probed probed = Probe(FloorWithBox(1, 6, 1, 6), 3, 3);
+  EXPECT_FALSE(probed.validity.valid);
+  EXPECT_FALSE(probed.validity.pushed_out);
+  EXPECT_EQ(probed.validity.backface_share, 1);
+}
+
+TEST(ProbeValidity, TexelJustInsideABoxIsPushedOut) {
+  const Probed probed = Probe(FloorWithBox(1, 6, 1, 6), 1, 3);
+  EXPECT_TRUE(probed.validity.valid);
+  EXPECT_TRUE(probed.validity.pushed_out);
+  EXPECT_EQ(probed.validity.backface_share, 1);
+}
+
+TEST(ProbeValidity, TexelBesideABoxIsValid) {
+  for (const int x : {0, 6, 7}) {
+    const Probed probed = Probe(FloorWithBox(1, 6, 1, 6), x, 3);
+    EXPECT_TRUE(probed.validity.valid) << x;
+    EXPECT_FALSE(probed.validity.pushed_out) << x;
+    EXPECT_EQ(probed.validity.backface_share, 0) << x;
+    EXPECT_EQ(probed.mask, 0xffff) << x;
+  }
+}
+
+TEST(ProbeValidity, HalfCoveredTexelIsMasked) {
+  // The box begins in the middle of the texel: columns 2 and 3 of its sixteenths are inside.
+  const Probed probed = Probe(FloorWithBox(1.5, 6, 1, 6), 1, 3);
+  EXPECT_TRUE(probed.validity.valid);
+  EXPECT_FALSE(probed.validity.pushed_out);
+  EXPECT_EQ(probed.mask, 0x3333);
+  EXPECT_NEAR(probed.validity.backface_share, 0.5, 1e-6);
+}
+
+TEST(ProbeValidity, NothingHasABackWhereBackfacesPass) {
+  const Probed probed = Probe(FloorWithBox(1, 6, 1, 6), 3, 3, BackfaceMode::kPass);
+  EXPECT_TRUE(probed.validity.valid);
+  EXPECT_EQ(probed.validity.rays, 0);
+}
+
+}  // namespace
+}  // namespace bakewell
