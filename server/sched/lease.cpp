@@ -111,8 +111,8 @@ std::optional<TaskId> Scheduler::PickHinted(Worker& worker, TaskId best) {
   // Hints name tasks by id, and an id may have been given again: what counts is that the task could be picked now.
   constexpr int kMaxTries = 8;
   for (int tried = 0; tried < kMaxTries && !worker.hints.empty(); ++tried) {
-    const TaskId hint = worker.hints.back();
-    worker.hints.pop_back();
+    const TaskId hint = worker.hints.front();
+    worker.hints.pop_front();
     const Task& task = TaskOf(hint);
     if (task.state != State::kReady || task.home != leader.home || task.failures > 0) continue;
     const auto& classes = worker.classes;

@@ -80,8 +80,8 @@ TaskId Scheduler::AddTask(JobId job, const TaskInfo& info) {
   for (const TaskId need : info.needs) {
     Task& needed = TaskOf(need);
     BAKEWELL_CHECK(needed.state != State::kFree);
-    if (needed.state == State::kDone) continue;
     needed.dependants.push_back(id);
+    if (needed.state == State::kDone) continue;
     ++task.waiting_for;
   }
   if (task.waiting_for == 0) MakeReady(id);
@@ -137,12 +137,10 @@ void Scheduler::FinishIfDone(JobId id) {
 void Scheduler::MarkDone(TaskId id, WorkerId by) {
   Task& task = TaskOf(id);
   task.state = State::kDone;
-  const std::vector<TaskId> dependants = std::move(task.dependants);
-  task.dependants.clear();
   task.excluded = {};
   // Workers that hold what a task needs are reminded of it.
   const auto worker = workers_.find(by);
-  for (const TaskId dependant : dependants) {
+  for (const TaskId dependant : task.dependants) {
     Task& next = TaskOf(dependant);
     if (next.state != State::kWaiting || --next.waiting_for > 0) continue;
     MakeReady(dependant);
@@ -153,6 +151,21 @@ void Scheduler::MarkDone(TaskId id, WorkerId by) {
   for (const JobId job : task.jobs) {
     --jobs_.at(job).remaining;
     FinishIfDone(job);
+  }
+}
+
+void Scheduler::Reopen(TaskId id) {
+  Task& task = TaskOf(id);
+  if (task.state != State::kDone) return;
+  for (const JobId job : task.jobs) ++jobs_.at(job).remaining;
+  MakeReady(id);
+  for (const TaskId dependant : task.dependants) {
+    Task& next = TaskOf(dependant);
+    if (next.state == State::kDone) continue;
+    if (next.state == State::kReady) ready_.Remove(dependant, SlotOf(next));
+    RevokeLeases(dependant);
+    next.state = State::kWaiting;
+    ++next.waiting_for;
   }
 }
 

@@ -59,6 +59,8 @@ class Scheduler {
   Completion Complete(TaskId task, LeaseToken token, Time now);
   // Done without having been run (the catalogue knew it).
   void CompleteKnown(TaskId task);
+  // The result of a task that is done was lost: it runs again, and what needs it and is not done waits.
+  void Reopen(TaskId task);
   // False, and no effect, unless the token is the task's current one.
   bool Fail(TaskId task, LeaseToken token, FailureKind kind, Time now);
   // Gives the lease back without blame.

@@ -341,6 +341,24 @@ TEST_F(SchedulerTest, AdoptedLeaseKeepsTheTaskFromOthers) {
   EXPECT_TRUE(None(kBob));
 }
 
+TEST_F(SchedulerTest, ReopenedTaskRunsAgainBeforeWhatNeedsIt) {
+  AddWorkers();
+  scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
+  const TaskId first = Add(kJob), second = Add(kJob, {first}), third = Add(kJob, {first});
+  scheduler.Complete(first, One(kAnn).token, now);
+  EXPECT_EQ(One(kAnn).task, second);
+  scheduler.Reopen(first);
+  scheduler.CheckConsistent();
+  EXPECT_EQ(Count(Event::Kind::kRevoked), 1);
+  const Grant again = One(kBob);
+  EXPECT_EQ(again.task, first);
+  EXPECT_TRUE(None(kCid));
+  scheduler.Complete(first, again.token, now);
+  EXPECT_NE(One(kCid).task, One(kDan).task);
+  EXPECT_EQ(scheduler.RemainingOf(kJob), 2u);
+  (void)third;
+}
+
 TEST_F(SchedulerTest, TokensRiseOverARestart) {
   AddWorkers();
   scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
