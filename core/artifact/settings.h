@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/base/status.h"
 #include "core/scene/scene.h"
 
 namespace bakewell {
@@ -28,5 +29,8 @@ struct BakeSettings {
   uint32_t seed = 0;
   std::optional<Environment> environment;  // replaces the scene's
 };
+
+// kInvalidArgument, naming the setting, its range and its value, where one is outside its range.
+absl::Status ValidateSettings(const BakeSettings& settings);
 
 }  // namespace bakewell

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/check.h"
@@ -18,6 +19,14 @@ struct Image {
   Image() = default;
   Image(int width_px, int height_px, std::vector<std::string> names)
       : width(width_px), height(height_px), channels(std::move(names)), data(PixelCount() * channels.size(), 0.0f) {}
+
+  // Index of the channel of that name, or -1.
+  int ChannelIndex(std::string_view name) const {
+    for (size_t c = 0; c < channels.size(); ++c) {
+      if (channels[c] == name) return static_cast<int>(c);
+    }
+    return -1;
+  }
 
   size_t PixelCount() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
   float& At(int c, int x, int y) { return data[Offset(c, x, y)]; }

@@ -1,0 +1,76 @@
+#include "core/artifact/manifest.h"
+
+#include <nlohmann/json.hpp>
+#include <span>
+#include <utility>
+
+#include "core/artifact/atomic_file.h"
+
+namespace bakewell {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormatVersion = 1;
+
+Json PhasesJson(const std::vector<PhaseTime>& phases) {
+  Json array = Json::array();
+  for (const PhaseTime& phase : phases) {
+    array.push_back({{"phase", phase.phase}, {"wall_seconds", phase.wall_seconds}, {"cpu_seconds", phase.cpu_seconds}});
+  }
+  return array;
+}
+
+Json FilesJson(const std::vector<ManifestFile>& files) {
+  Json array = Json::array();
+  for (const ManifestFile& file : files) {
+    array.push_back(
+        {{"name", file.name}, {"kind", file.kind}, {"size_bytes", file.size_bytes}, {"sha256", file.sha256.Hex()}});
+  }
+  return array;
+}
+
+Json StatisticsJson(const Manifest& manifest) {
+  double wall_seconds = 0, cpu_seconds = 0;
+  for (const PhaseTime& phase : manifest.phases) {
+    wall_seconds += phase.wall_seconds;
+    cpu_seconds += phase.cpu_seconds;
+  }
+  return {{"wall_seconds", wall_seconds},
+          {"cpu_seconds", cpu_seconds},
+          {"rays", manifest.rays},
+          {"photons", manifest.photons},
+          {"estimated_error", manifest.estimated_error},
+          {"phases", PhasesJson(manifest.phases)},
+          {"counters", manifest.counters.empty() ? Json::object() : Json(manifest.counters)}};
+}
+
+}  // namespace
+
+absl::StatusOr<ManifestFile> DescribeFile(const std::filesystem::path& path, std::string kind) {
+  BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, ReadWholeFile(path));
+  return ManifestFile{path.filename().string(), std::move(kind), bytes.size(),
+                      Sha256Of(std::as_bytes(std::span(bytes)))};
+}
+
+absl::StatusOr<std::string> ManifestJson(const Manifest& manifest) {
+  const Json settings = Json::parse(manifest.settings_json, nullptr, false);
+  if (!settings.is_object()) return absl::InvalidArgumentError("the manifest's settings are not a JSON object");
+  const Json json = {{"format", kFormatVersion},
+                     {"program", manifest.program},
+                     {"version", manifest.version},
+                     {"task_versions", manifest.task_versions.empty() ? Json::object() : Json(manifest.task_versions)},
+                     {"scene", {{"file", manifest.scene_file}, {"sha256", manifest.scene_digest.Hex()}}},
+                     {"settings", settings},
+                     {"statistics", StatisticsJson(manifest)},
+                     {"warnings", manifest.warnings},
+                     {"files", FilesJson(manifest.files)}};
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+absl::Status WriteManifest(const std::filesystem::path& folder, const Manifest& manifest) {
+  BAKEWELL_ASSIGN_OR_RETURN(const std::string json, ManifestJson(manifest));
+  return WriteFileAtomically(folder / "manifest.json", json);
+}
+
+}  // namespace bakewell

@@ -1,0 +1,125 @@
+#include "worker/gather/direct.h"
+
+#include <algorithm>
+
+#include "worker/sample/sobol.h"
+#include "worker/sample/warp.h"
+
+namespace bakewell {
+namespace {
+
+constexpr int kProbesPerLight = 8;
+constexpr float kUnseenShare = 0.05f;  // a light that no probe saw keeps this share of its importance
+
+}  // namespace
+
+TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, uint32_t key,
+                       GatherCounters& counters)
+    : scene_(scene), visibility_(static_cast<size_t>(scene.lights.local_count()), 1.0f) {
+  if (scene.lights.local_count() < 2 || begin == end) return;
+  for (int light = 0; light < scene.lights.local_count(); ++light) {
+    int tried = 0, seen = 0;
+    for (int i = 0; i < kProbesPerLight; ++i) {
+      const uint32_t which = begin + (end - begin) * static_cast<uint32_t>(2 * i + 1) / (2 * kProbesPerLight);
+      const Texel& texel = map.texels[which];
+      const uint32_t probe_key = HashCombine(HashCombine(key, static_cast<uint32_t>(light)), static_cast<uint32_t>(i));
+      const LightSample sample = scene.lights.SampleLocal(
+          light, texel.position, {UnitFloat(HashCombine(probe_key, 1)), UnitFloat(HashCombine(probe_key, 2))});
+      if (MaxComponent(sample.perpendicular) <= 0 || Dot(sample.dir, texel.normal) <= 0) continue;
+      const SurfacePoint point{texel.position, texel.normal,
+                               scene.world.PointAt(map.fragments[texel.fragment_begin].triangle, 0, 0, false).offset};
+      ++tried;
+      ++counters.shadow_rays;
+      seen += scene.world.Occluded(ShadowRay(point, sample, probe_key)) ? 0 : 1;
+    }
+    if (tried > 0) {
+      visibility_[light] = std::max(kUnseenShare, static_cast<float>(seen) / static_cast<float>(tried));
+    }
+  }
+}
+
+TileLights::Choice TileLights::ForTexel(const Texel& texel, float radius) const {
+  Choice choice;
+  const int count = scene_.lights.local_count();
+  std::vector<float> weights;
+  for (int light = 0; light < count; ++light) {
+    const float importance = scene_.lights.Importance(light, texel.position, texel.flat ? texel.normal : Vec3f{}, radius);
+    if (!(importance > 0)) continue;
+    choice.light.push_back(light);
+    weights.push_back(importance * visibility_[light]);
+  }
+  if (weights.empty()) return choice;
+  choice.distribution = Distribution1D(weights);
+  if (scene_.lights.emissive().empty()) return choice;
+  choice.probability_of_light.assign(static_cast<size_t>(count), 0.0f);
+  for (size_t i = 0; i < choice.light.size(); ++i) {
+    choice.probability_of_light[choice.light[i]] = choice.distribution.Probability(static_cast<int>(i));
+  }
+  return choice;
+}
+
+namespace {
+
+// One shadow ray towards `sample`; adds what arrives to the texel's sums.
+class DirectAdder {
+ public:
+  DirectAdder(const GatherScene& scene, Accumulator& sum, GatherCounters& counters)
+      : scene_(scene), sum_(sum), counters_(counters) {}
+
+  void Add(const TexelPoint& point, const LightSample& sample, float probability, uint32_t key) {
+    const float cosine = Dot(sample.dir, point.surface.normal);
+    if (cosine <= 0 || MaxComponent(sample.perpendicular) <= 0) return;
+    ++counters_.shadow_rays;
+    if (scene_.world.Occluded(ShadowRay(point.surface, sample, key))) return;
+    const float light_pdf = sample.pdf * probability;
+    const float weight = sample.pdf > 0 ? light_pdf / (light_pdf + GatherPdf(cosine)) : 1.0f;
+    const Rgb radiance_over_pdf = sample.perpendicular * (weight / probability);
+    if (!IsFinite(radiance_over_pdf)) {
+      ++counters_.bad_samples;
+      return;
+    }
+    irradiance_ += radiance_over_pdf * cosine;
+    sum_.AddSh(sample.dir, radiance_over_pdf);
+  }
+
+  void Finish(uint32_t index, uint32_t planned) {
+    sum_.AddIrradiance(index, planned, irradiance_);
+    irradiance_ = {};
+  }
+
+ private:
+  const GatherScene& scene_;
+  Accumulator& sum_;
+  GatherCounters& counters_;
+  Rgb irradiance_;
+};
+
+}  // namespace
+
+void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights::Choice& choice, uint32_t key,
+                  uint32_t begin, uint32_t end, Accumulator& sum, GatherCounters& counters) {
+  const SobolSet set(HashCombine(key, 0xd12ec7u)), far_set(HashCombine(key, 0xfa25e7u));
+  const EnvironmentLight& sky = scene.lights.environment();
+  const bool sky_sampled = sky.bright() && !sky.smooth();
+  DirectAdder adder(scene, sum, counters);
+  for (uint32_t i = begin; i < end; ++i) {
+    const TexelPoint point = sampler.At(set.Get2(i, 0));
+    if (!point.valid) continue;
+    sum.Count();
+    const uint32_t ray_key = HashCombine(key, i);
+    if (!choice.empty()) {
+      const auto drawn = choice.distribution.Draw(set.Get(i, 2));
+      const int light = choice.light[drawn.index];
+      adder.Add(point, scene.lights.SampleLocal(light, point.surface.position, set.Get2(i, 3)), drawn.probability, ray_key);
+    }
+    for (size_t k = 0; k < scene.lights.directionals().size(); ++k) {
+      const Vec2f shift{UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k))), UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k + 1)))};
+      const Vec2f u = far_set.Get2(i, 0) + (k == 0 ? Vec2f{} : shift);
+      adder.Add(point, scene.lights.SampleDirectional(static_cast<int>(k), {u.x - std::floor(u.x), u.y - std::floor(u.y)}), 1, ray_key);
+    }
+    if (sky_sampled) adder.Add(point, scene.lights.SampleEnvironment(far_set.Get2(i, 2)), 1, ray_key);
+    adder.Finish(i, end);
+  }
+}
+
+}  // namespace bakewell

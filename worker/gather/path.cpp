@@ -1,0 +1,100 @@
+#include "worker/gather/path.h"
+
+#include <limits>
+
+#include "worker/sample/hash.h"
+#include "worker/sample/warp.h"
+
+namespace bakewell {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr int kMaxExtraBounces = 4;
+// A hit nearer than this many neighbourhood widths continues the path.
+constexpr float kNearWidths = 1.5f;
+
+float Random(uint32_t key, uint32_t what) { return UnitFloat(HashCombine(key, what)); }
+
+float BalanceWeight(float pdf, float other) { return pdf + other > 0 ? pdf / (pdf + other) : 0; }
+
+// Light that a bounce direction finds by itself: emission and sky, weighted against SampleDirect.
+Rgb FoundLight(const GatherScene& scene, const SurfacePoint& from, Vec3f dir, const Hit& hit) {
+  const float pdf = std::max(0.0f, Dot(dir, from.normal)) * kInvPiF;
+  if (!hit) {
+    const EnvironmentLight& sky = scene.lights.environment();
+    if (!sky.bright()) return {};
+    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : BalanceWeight(pdf, sky.Pdf(dir)));
+  }
+  const int light = scene.lights.LightOfTriangle(hit.triangle);
+  if (light < 0) return {};
+  const Rgb emission = scene.world.EmissionAt(hit);
+  if (MaxComponent(emission) <= 0) return {};
+  const float light_pdf = scene.selector.Probability(light) * scene.lights.PdfLocal(light, from.position, dir, hit.t);
+  return emission * BalanceWeight(pdf, light_pdf);
+}
+
+Rgb Arriving(const GatherScene& scene, const SurfacePoint& point, const LightSample& sample, float probability, uint32_t key,
+             GatherCounters& counters) {
+  const float cosine = Dot(sample.dir, point.normal);
+  if (cosine <= 0 || MaxComponent(sample.perpendicular) <= 0 || probability <= 0) return {};
+  ++counters.shadow_rays;
+  if (scene.world.Occluded(ShadowRay(point, sample, key))) return {};
+  const float light_pdf = sample.pdf * probability;
+  const float weight = sample.pdf > 0 ? BalanceWeight(light_pdf, cosine * kInvPiF) : 1.0f;
+  return sample.perpendicular * (cosine * weight / probability);
+}
+
+}  // namespace
+
+Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters) {
+  Rgb irradiance;
+  if (!scene.selector.empty()) {
+    const LightSelector::Choice choice = scene.selector.Pick(Random(key, 1));
+    const LightSample sample = scene.lights.SampleLocal(choice.light, point.position, {Random(key, 2), Random(key, 3)});
+    irradiance += Arriving(scene, point, sample, choice.probability, key, counters);
+  }
+  for (size_t i = 0; i < scene.lights.directionals().size(); ++i) {
+    const uint32_t k = static_cast<uint32_t>(2 * i);
+    const LightSample sample = scene.lights.SampleDirectional(static_cast<int>(i), {Random(key, 16 + k), Random(key, 17 + k)});
+    irradiance += Arriving(scene, point, sample, 1, key, counters);
+  }
+  const EnvironmentLight& sky = scene.lights.environment();
+  if (sky.bright() && !sky.smooth()) {
+    const LightSample sample = scene.lights.SampleEnvironment({Random(key, 4), Random(key, 5)});
+    irradiance += Arriving(scene, point, sample, 1, key, counters);
+  }
+  return irradiance;
+}
+
+GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, uint32_t key, GatherCounters& counters) {
+  GatheredRadiance result;
+  Rgb throughput{1, 1, 1};
+  Hit hit = first;
+  for (int bounce = 0;; ++bounce) {
+    throughput = throughput * scene.world.AlbedoAt(hit) * kInvPiF;
+    if (MaxComponent(throughput) <= 0) return result;
+    const SurfacePoint point = scene.world.PointAt(hit);
+    const size_t cell = 2 * static_cast<size_t>(scene.cells.CellAt(hit.triangle, point.position)) + (hit.back ? 1 : 0);
+    const uint8_t window = scene.cache.window[cell];
+    const uint32_t step_key = HashCombine(key, static_cast<uint32_t>(bounce));
+    const bool near = hit.t < kNearWidths * scene.cache.cell_size_m * static_cast<float>(window);
+    const bool read = (window != 0 && !near) || bounce == kMaxExtraBounces;
+    if (read) {
+      result.radiance += throughput * (scene.cache.irradiance[cell].direct + scene.cache.irradiance[cell].indirect);
+      const float weight = Luminance(throughput);
+      for (size_t g = 0; g < kVarianceGroups; ++g) result.group[g] = weight * scene.cache.group[cell][g];
+      return result;
+    }
+    result.radiance += throughput * SampleDirect(scene, point, step_key, counters);
+    const Frame frame = FrameFromHint(point.normal, scene.world.triangles()[hit.triangle].e1);
+    const Vec3f dir = frame.ToWorld(CosineHemisphere({Random(step_key, 8), Random(step_key, 9)}));
+    ++counters.bounce_rays;
+    const Hit next = scene.world.Intersect({RayOrigin(point), dir, kInfinity, step_key});
+    throughput = throughput * kPiF;  // cosine lobe: irradiance is pi times the radiance found
+    result.radiance += throughput * FoundLight(scene, point, dir, next);
+    if (!next) return result;
+    hit = next;
+  }
+}
+
+}  // namespace bakewell

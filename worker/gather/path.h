@@ -1,0 +1,37 @@
+#pragma once
+
+#include "worker/light/select.h"
+#include "worker/photon/cache.h"
+
+namespace bakewell {
+
+// What the gather reads; all of it immutable.
+struct GatherScene {
+  const World& world;
+  const LightSet& lights;
+  const LightSelector& selector;
+  const SurfaceCells& cells;
+  const RadianceCache& cache;
+};
+
+struct GatherCounters {
+  int64_t gather_rays = 0, shadow_rays = 0, bounce_rays = 0, validity_rays = 0, bad_samples = 0;
+};
+
+// Light that one gather ray brings back.
+struct GatheredRadiance {
+  Rgb radiance;         // reflected at the hit (emission is the caller's)
+  std::array<float, kVarianceGroups> group{};  // luminance of the part that photons contributed, by photon group
+};
+
+// Radiance reflected towards a gather ray's origin at `hit`, `distance` away: direct light sampled at the hit plus the
+// cache's indirect light; where the hit is nearer than a few bandwidths, or the cell is cut by other geometry, one further
+// bounce instead (theory.md 3, step 2). `key` decides all random numbers.
+GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& hit, uint32_t key, GatherCounters& counters);
+
+// Direct irradiance at a surface point by light sampling: one local light chosen by flux, every directional light, the
+// sky where it is not smooth. With multiple importance sampling (balance heuristic) against a cosine lobe for lights that
+// a bounce can hit.
+Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters);
+
+}  // namespace bakewell

@@ -1,0 +1,221 @@
+#include "worker/gather/tile.h"
+
+#include <cmath>
+#include <limits>
+
+#include "worker/gather/direct.h"
+#include "worker/sample/sobol.h"
+#include "worker/sample/warp.h"
+#include "worker/texel/validity.h"
+
+namespace bakewell {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
+Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Vec3f from, Vec3f dir, float pdf, const Hit& hit) {
+  if (!hit) {
+    const EnvironmentLight& sky = scene.lights.environment();
+    if (!sky.bright()) return {};
+    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : pdf / (pdf + sky.Pdf(dir)));
+  }
+  const int light = scene.lights.LightOfTriangle(hit.triangle);
+  if (light < 0) return {};
+  const Rgb emission = scene.world.EmissionAt(hit);
+  if (MaxComponent(emission) <= 0) return {};
+  const float chosen = choice.empty() ? 0 : choice.probability_of_light[light];
+  const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from, dir, hit.t) : 0;
+  return emission * (pdf / (pdf + light_pdf));
+}
+
+// Everything about one texel while its tile is in flight.
+struct Work {
+  TexelSampler sampler;
+  TileLights::Choice choice;
+  uint32_t key = 0;
+  bool valid = true;
+  float backface_share = 0;
+  bool direct_active = true, indirect_active = true;
+  Accumulator direct, indirect;
+  std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
+  int direct_samples = 0, indirect_samples = 0;
+};
+
+class TileGatherer {
+ public:
+  TileGatherer(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, const GatherOptions& options,
+               GatherCounters& counters)
+      : scene_(scene), map_(map), begin_(begin), end_(end), options_(options), counters_(counters) {}
+
+  std::vector<TexelLight> Run(const AtlasLayout& layout) {
+    Prepare(layout);
+    for (int done = 0, planned = options_.min_samples; planned <= options_.max_samples; done = planned, planned *= 2) {
+      if (!Round(static_cast<uint32_t>(done), static_cast<uint32_t>(planned))) break;
+      Decide();
+    }
+    std::vector<TexelLight> result;
+    for (const Work& work : work_) result.push_back(Finish(work));
+    return result;
+  }
+
+ private:
+  void Prepare(const AtlasLayout& layout) {
+    const uint32_t tile_key = TexelKey(map_.texels[begin_], options_.seed ^ 0x711eu);
+    const TileLights lights(scene_, map_, begin_, end_, tile_key, counters_);
+    work_.reserve(end_ - begin_);
+    for (uint32_t i = begin_; i < end_; ++i) {
+      const Texel& texel = map_.texels[i];
+      Work work{.sampler = TexelSampler(scene_.world, layout, map_, texel)};
+      work.key = TexelKey(texel, options_.seed);
+      const TexelValidity validity = ProbeValidity(scene_.world, work.key, work.sampler);
+      counters_.validity_rays += validity.rays;
+      work.valid = validity.valid;
+      work.backface_share = validity.backface_share;
+      work.direct_active = work.indirect_active = validity.valid;
+      work.choice = lights.ForTexel(texel, work.sampler.radius());
+      if (NoExplicitLight(work)) work.direct_active = false;
+      work_.push_back(std::move(work));
+    }
+  }
+
+  bool NoExplicitLight(const Work& work) const {
+    const EnvironmentLight& sky = scene_.lights.environment();
+    return work.choice.empty() && scene_.lights.directionals().empty() && (!sky.bright() || sky.smooth());
+  }
+
+  // Samples [done, planned) of every active texel. False when none was active.
+  bool Round(uint32_t done, uint32_t planned) {
+    bool any = false;
+    for (Work& work : work_) {
+      if (work.direct_active) {
+        if (done > 0) work.direct.Double();
+        GatherDirect(scene_, work.sampler, work.choice, work.key, done, planned, work.direct, counters_);
+        work.direct_samples = static_cast<int>(planned);
+      }
+      if (work.indirect_active) {
+        if (done > 0) work.indirect.Double();
+        GatherIndirect(work, done, planned);
+        work.indirect_samples = static_cast<int>(planned);
+      }
+      any |= work.direct_active || work.indirect_active;
+    }
+    return any;
+  }
+
+  void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
+    const SobolSet set(HashCombine(work.key, 0x6a7e2u));
+    for (uint32_t i = begin; i < end; ++i) {
+      const TexelPoint point = work.sampler.At(set.Get2(i, 2));
+      if (!point.valid) continue;
+      work.indirect.Count();
+      const Vec3f local = GatherHemisphere(set.Get2(i, 0));
+      const Vec3f dir = point.frame.ToWorld(local);
+      const float pdf = GatherPdf(local.z);
+      const uint32_t ray_key = HashCombine(work.key, 0x80000000u | i);
+      ++counters_.gather_rays;
+      const Hit hit = scene_.world.Intersect({RayOrigin(point.surface), dir, kInfinity, ray_key});
+      Rgb radiance = FoundByGather(scene_, work.choice, point.surface.position, dir, pdf, hit);
+      if (hit) {
+        const GatheredRadiance reflected = ReflectedRadiance(scene_, hit, ray_key, counters_);
+        radiance += reflected.radiance;
+        for (size_t g = 0; g < kVarianceGroups; ++g) work.group[g] += reflected.group[g] * (local.z / pdf);
+      }
+      if (!IsFinite(radiance)) {
+        ++counters_.bad_samples;
+        continue;
+      }
+      work.indirect.AddIrradiance(i, end, radiance * (local.z / pdf));
+      work.indirect.AddSh(dir, radiance / pdf);
+    }
+  }
+
+  // Variance (luminance) averaged over the texel and those of its eight neighbours that share its chart and tile.
+  template <typename Of>
+  float PooledVariance(size_t i, Of of) const {
+    const Texel& texel = map_.texels[begin_ + i];
+    const PageSize page = map_.pages[texel.page];
+    float sum = 0;
+    int count = 0;
+    for (int y = std::max(0, texel.y - 1); y <= std::min(page.height - 1, texel.y + 1); ++y) {
+      for (int x = std::max(0, texel.x - 1); x <= std::min(page.width - 1, texel.x + 1); ++x) {
+        const size_t at = static_cast<size_t>(y) * static_cast<size_t>(page.width) + static_cast<size_t>(x);
+        const int64_t j = int64_t{map_.texel_at[texel.page][at]} - begin_;
+        if (j < 0 || j >= static_cast<int64_t>(work_.size()) || !work_[j].valid) continue;
+        if (map_.texels[begin_ + static_cast<size_t>(j)].chart != texel.chart) continue;
+        sum += Luminance(of(work_[j]).Variance());
+        ++count;
+      }
+    }
+    return count > 0 ? sum / static_cast<float>(count) : 0;
+  }
+
+  // Switches off the estimators that meet their half of the target.
+  void Decide() {
+    if (options_.target_error <= 0) return;
+    std::vector<std::array<bool, 2>> active(work_.size());
+    for (size_t i = 0; i < work_.size(); ++i) {
+      const Work& work = work_[i];
+      const float irradiance = Luminance(work.direct.Irradiance() + work.indirect.Irradiance());
+      const float scale = options_.target_error * std::max(irradiance, options_.floor_share * options_.mean_irradiance);
+      const float budget = 0.5f * scale * scale;
+      active[i] = {work.direct_active && PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
+                   work.indirect_active && PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.indirect; }) > budget};
+    }
+    for (size_t i = 0; i < work_.size(); ++i) {
+      work_[i].direct_active = active[i][0];
+      work_[i].indirect_active = active[i][1];
+    }
+  }
+
+  // Variance of the texel's irradiance that comes from the finite number of photons.
+  static float PhotonVariance(const Work& work) {
+    if (work.indirect.count() <= 0) return 0;
+    float mean = 0, sum = 0;
+    for (const float g : work.group) mean += g / kVarianceGroups;
+    for (const float g : work.group) sum += (g - mean) * (g - mean);
+    const float n = work.indirect.count();
+    return sum / (n * n * kVarianceGroups * (kVarianceGroups - 1));
+  }
+
+  TexelLight Finish(const Work& work) const {
+    TexelLight light;
+    light.valid = work.valid;
+    light.backface_share = work.backface_share;
+    if (!work.valid) return light;
+    light.irradiance = work.direct.Irradiance() + work.indirect.Irradiance();
+    const RadianceSh direct = work.direct.Sh(), indirect = work.indirect.Sh();
+    for (size_t i = 0; i < kShCoefficients; ++i) light.sh.lambda[i] = direct.lambda[i] + indirect.lambda[i];
+    light.variance = work.direct.Variance() + work.indirect.Variance();
+    // Photon noise is known in luminance; it is spread over the channels as the irradiance is.
+    const float luminance = Luminance(light.irradiance);
+    if (luminance > 0) {
+      const Rgb share = light.irradiance / luminance;
+      light.variance += share * share * PhotonVariance(work);
+    }
+    light.direct_samples = work.direct_samples;
+    light.indirect_samples = work.indirect_samples;
+    return light;
+  }
+
+  const GatherScene& scene_;
+  const TexelMap& map_;
+  const uint32_t begin_, end_;
+  const GatherOptions& options_;
+  GatherCounters& counters_;
+  std::vector<Work> work_;
+};
+
+}  // namespace
+
+uint32_t TexelKey(const Texel& texel, uint32_t seed) {
+  const uint32_t place = HashCombine(static_cast<uint32_t>(texel.x), static_cast<uint32_t>(texel.y));
+  return HashCombine(HashCombine(seed, static_cast<uint32_t>(texel.page)), place);
+}
+
+std::vector<TexelLight> GatherTile(const GatherScene& scene, const AtlasLayout& layout, const TexelMap& map, int tile,
+                                   const GatherOptions& options, GatherCounters& counters) {
+  return TileGatherer(scene, map, map.tile_begin[tile], map.tile_begin[tile + 1], options, counters).Run(layout);
+}
+
+}  // namespace bakewell

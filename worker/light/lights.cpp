@@ -1,0 +1,218 @@
+#include "worker/light/lights.h"
+
+#include <cmath>
+#include <limits>
+
+#include "worker/light/spherical_triangle.h"
+#include "worker/sample/warp.h"
+
+namespace bakewell {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Mean of a textured emission over a triangle: a fixed 8 x 8 pattern of the low-distortion map.
+Rgb MeanRadiance(const World& world, uint32_t triangle) {
+  if (world.MaterialOf(world.triangles()[triangle]).emission_texture.texture < 0) {
+    return world.FrontEmissionAt(triangle, 0, 0);
+  }
+  Rgb sum;
+  for (int i = 0; i < 64; ++i) {
+    const Vec2f b = TriangleFromSquare({(static_cast<float>(i % 8) + 0.5f) / 8, (static_cast<float>(i / 8) + 0.5f) / 8});
+    sum += world.FrontEmissionAt(triangle, b.x, b.y);
+  }
+  return sum * (1.0f / 64);
+}
+
+}  // namespace
+
+float SpotFalloff(const PunctualLight& light, float cos_angle) {
+  if (light.type != LightType::kSpot) return 1;
+  const float width = light.cos_inner - light.cos_outer;
+  if (width <= 0) return cos_angle >= light.cos_outer ? 1.0f : 0.0f;
+  const float x = std::clamp((cos_angle - light.cos_outer) / width, 0.0f, 1.0f);
+  return x * x;
+}
+
+LightSet::LightSet(const World& world, const Environment& environment) : world_(world), environment_(environment) {
+  for (const PunctualLight& light : world.scene().lights) {
+    if (MaxComponent(light.intensity) <= 0) continue;
+    (light.type == LightType::kDirectional ? directionals_ : locals_).push_back(light);
+  }
+  for (uint32_t k = 0; k < world.triangles().size(); ++k) {
+    if (!world.Emits(k)) continue;
+    const Triangle& t = world.triangles()[k];
+    const Rgb radiance = MeanRadiance(world, k);
+    if (MaxComponent(radiance) <= 0) continue;
+    if (light_of_triangle_.empty()) light_of_triangle_.assign(world.triangles().size(), -1);
+    light_of_triangle_[k] = local_count();
+    emissive_.push_back({k, 0.5f * Length(Cross(t.e1, t.e2)), radiance, world.MaterialOf(t).double_sided});
+  }
+}
+
+int LightSet::LightOfTriangle(uint32_t triangle) const {
+  return light_of_triangle_.empty() ? -1 : light_of_triangle_[triangle];
+}
+
+namespace {
+
+// Triangles that fill more than this are drawn by solid angle, where single precision resolves the spherical triangle.
+constexpr float kSolidAngleThreshold = 0.01f;  // [sr]
+
+SphericalTriangle SeenFrom(const Triangle& t, Vec3f position) {
+  return {NormalizeOrZero(t.p0 - position), NormalizeOrZero(t.p0 + t.e1 - position),
+          NormalizeOrZero(t.p0 + t.e2 - position)};
+}
+
+// Barycentrics of the point where a ray meets a triangle's plane, brought into the triangle.
+Vec2f Barycentrics(const Triangle& t, Vec3f origin, Vec3f dir) {
+  const Vec3f s = origin - t.p0, h = Cross(dir, t.e2), q = Cross(s, t.e1);
+  const float det = Dot(t.e1, h);
+  if (det == 0) return {1.0f / 3, 1.0f / 3};
+  const float u = std::clamp(Dot(s, h) / det, 0.0f, 1.0f);
+  return {u, std::clamp(Dot(dir, q) / det, 0.0f, 1 - u)};
+}
+
+}  // namespace
+
+LightSample LightSet::SampleTriangle(const EmissiveTriangle& light, Vec3f position, Vec2f u) const {
+  const Triangle& t = world_.triangles()[light.triangle];
+  const SphericalTriangle seen = SeenFrom(t, position);
+  const bool near = seen.solid_angle() > kSolidAngleThreshold;
+  const Vec2f b = near ? Barycentrics(t, position, seen.Draw(u)) : TriangleFromSquare(u);
+  LightSample sample;
+  const Vec3f point = t.p0 + t.e1 * b.x + t.e2 * b.y;
+  const Vec3f to_light = point - position;
+  const float distance = Length(to_light);
+  sample.dir = NormalizeOrZero(to_light);
+  const float cos_light = -Dot(sample.dir, t.normal);
+  if (!(distance > 0) || cos_light == 0 || (cos_light < 0 && !light.two_sided)) return sample;
+  sample.pdf = near ? 1 / seen.solid_angle() : distance * distance / (std::fabs(cos_light) * light.area);
+  const SurfacePoint end = world_.PointAt(light.triangle, b.x, b.y, cos_light < 0);
+  sample.target = RayOrigin(end);
+  sample.perpendicular = world_.FrontEmissionAt(light.triangle, b.x, b.y) / sample.pdf;
+  return sample;
+}
+
+LightSample LightSet::SampleLocal(int light, Vec3f position, Vec2f u) const {
+  if (IsEmissive(light)) return SampleTriangle(emissive_[static_cast<size_t>(light) - locals_.size()], position, u);
+  const PunctualLight& punctual = locals_[light];
+  LightSample sample;
+  const Vec3f to_light = punctual.position - position;
+  const float distance2 = Dot(to_light, to_light);
+  if (!(distance2 > 0)) return sample;
+  sample.dir = NormalizeOrZero(to_light);
+  sample.target = punctual.position;
+  sample.perpendicular = punctual.intensity * (SpotFalloff(punctual, -Dot(sample.dir, punctual.direction)) / distance2);
+  return sample;
+}
+
+float LightSet::PdfLocal(int light, Vec3f position, Vec3f dir, float t) const {
+  const EmissiveTriangle& emissive = emissive_[static_cast<size_t>(light) - locals_.size()];
+  const Triangle& triangle = world_.triangles()[emissive.triangle];
+  const float solid_angle = SeenFrom(triangle, position).solid_angle();
+  if (solid_angle > kSolidAngleThreshold) return 1 / solid_angle;
+  const float cos_light = std::fabs(Dot(dir, triangle.normal));
+  return cos_light > 0 ? t * t / (cos_light * emissive.area) : 0;
+}
+
+LightSample LightSet::SampleDirectional(int directional, Vec2f u) const {
+  const PunctualLight& light = directionals_[directional];
+  LightSample sample;
+  sample.infinite = true;
+  sample.dir = -light.direction;
+  sample.perpendicular = light.intensity;
+  if (light.angular_diameter_rad <= 0) return sample;
+  // Uniform over the disc's projection, whose density per steradian is cos/(pi sin^2 radius); radiance is
+  // E/(pi sin^2 radius), so that each point brings E/cos.
+  const float sin_radius = std::sin(0.5f * light.angular_diameter_rad);
+  const Vec2f d = DiscFromSquare(u) * sin_radius;
+  const float z = std::sqrt(std::max(0.0f, 1 - d.x * d.x - d.y * d.y));
+  const Vec3f bitangent = Cross(light.direction, light.tangent);
+  sample.dir = NormalizeOrZero(light.tangent * d.x + bitangent * d.y - light.direction * z);
+  sample.perpendicular = light.intensity / z;
+  return sample;
+}
+
+LightSample LightSet::SampleEnvironment(Vec2f u) const {
+  const auto drawn = environment_.Draw(u);
+  LightSample sample;
+  sample.infinite = true;
+  sample.dir = drawn.dir;
+  sample.pdf = drawn.pdf;
+  if (drawn.pdf > 0) sample.perpendicular = environment_.Radiance(drawn.dir) / drawn.pdf;
+  return sample;
+}
+
+namespace {
+
+// Largest cosine between a plane's normal and the direction to a light at height `height` (a point's, plus what the
+// region around it adds); never quite zero for lights in front.
+float SurfaceCosine(float height, float distance, Vec3f normal) {
+  if (Dot(normal, normal) < 0.5f) return 1;
+  if (height <= 0) return 0;
+  return std::clamp(height / distance, 0.01f, 1.0f);
+}
+
+// SpotFalloff's maximum over directions within the angle whose sine is `sin_delta`.
+float WidenedFalloff(const PunctualLight& light, float cos_angle, float sin_delta) {
+  const float cos_delta = std::sqrt(std::max(0.0f, 1 - sin_delta * sin_delta));
+  if (cos_angle >= cos_delta) return 1;
+  const float sin_angle = std::sqrt(std::max(0.0f, 1 - cos_angle * cos_angle));
+  return SpotFalloff(light, cos_angle * cos_delta + sin_angle * sin_delta);
+}
+
+}  // namespace
+
+float LightSet::ImportanceOfTriangle(const EmissiveTriangle& light, Vec3f position, Vec3f normal, float radius) const {
+  const Triangle& t = world_.triangles()[light.triangle];
+  const Vec3f corners[3] = {t.p0 - position, t.p0 + t.e1 - position, t.p0 + t.e2 - position};
+  const float facing = -Dot(corners[0], t.normal) + radius;
+  if (facing <= 0 && !light.two_sided) return 0;
+  float height = -kInfinity;
+  for (const Vec3f c : corners) height = std::max(height, Dot(c, normal));
+  const Vec3f center = (corners[0] + corners[1] + corners[2]) * (1.0f / 3);
+  const float distance2 = Dot(center, center) + 0.5f * light.area + radius * radius;
+  const float distance = std::sqrt(distance2);
+  const float cos_light = std::clamp(std::fabs(facing) / distance, 0.02f, 1.0f);
+  return Luminance(light.mean_radiance) * light.area * SurfaceCosine(height + radius, distance, normal) * cos_light /
+         distance2;
+}
+
+float LightSet::Importance(int light, Vec3f position, Vec3f normal, float radius) const {
+  if (IsEmissive(light)) {
+    return ImportanceOfTriangle(emissive_[static_cast<size_t>(light) - locals_.size()], position, normal, radius);
+  }
+  const PunctualLight& punctual = locals_[light];
+  const Vec3f to_light = punctual.position - position;
+  const float distance2 = Dot(to_light, to_light) + radius * radius;
+  const float distance = std::sqrt(distance2);
+  if (!(distance > 0)) return 0;
+  const float falloff = WidenedFalloff(punctual, -Dot(to_light, punctual.direction) / distance, std::min(1.0f, radius / distance));
+  return Luminance(punctual.intensity) * falloff * SurfaceCosine(Dot(to_light, normal) + radius, distance, normal) /
+         distance2;
+}
+
+float LightSet::Power(int light) const {
+  if (IsEmissive(light)) {
+    const EmissiveTriangle& e = emissive_[static_cast<size_t>(light) - locals_.size()];
+    return Luminance(e.mean_radiance) * e.area * kPiF * (e.two_sided ? 2.0f : 1.0f);
+  }
+  const PunctualLight& punctual = locals_[light];
+  const float solid_angle =
+      punctual.type == LightType::kPoint
+          ? 4 * kPiF
+          : 2 * kPiF * (1 - punctual.cos_inner + (punctual.cos_inner - punctual.cos_outer) / 3);
+  return Luminance(punctual.intensity) * solid_angle;
+}
+
+Ray ShadowRay(const SurfacePoint& from, const LightSample& sample, uint32_t key) {
+  Ray ray{RayOrigin(from), sample.dir, kInfinity, key};
+  if (sample.infinite) return ray;
+  const Vec3f to_light = sample.target - ray.origin;
+  ray.t_max = Length(to_light);
+  ray.dir = NormalizeOrZero(to_light);
+  return ray;
+}
+
+}  // namespace bakewell

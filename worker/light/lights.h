@@ -1,0 +1,76 @@
+#pragma once
+
+#include <vector>
+
+#include "worker/light/environment.h"
+#include "worker/trace/world.h"
+
+namespace bakewell {
+
+// A triangle that emits, with its mean front radiance.
+struct EmissiveTriangle {
+  uint32_t triangle = 0;
+  float area = 0;  // [m^2]
+  Rgb mean_radiance;
+  bool two_sided = false;
+};
+
+// Light that arrives at a point from one sampled point of one light, before visibility.
+struct LightSample {
+  Vec3f dir;                 // unit, towards the light
+  Vec3f target;              // where the shadow ray ends (finite lights)
+  bool infinite = false;     // the shadow ray has no end
+  Rgb perpendicular;         // irradiance on a plane facing the light, divided by the pdf of the point [W m^-2]
+  float pdf = 0;             // per steradian, given the light; 0 for a delta light
+};
+
+// Every light of a scene. Local lights are numbered: punctual ones that are not directional, then emissive triangles.
+// Immutable, thread safe.
+class LightSet {
+ public:
+  LightSet(const World& world, const Environment& environment);
+
+  int local_count() const { return static_cast<int>(locals_.size() + emissive_.size()); }
+  const std::vector<PunctualLight>& locals() const { return locals_; }
+  const std::vector<PunctualLight>& directionals() const { return directionals_; }
+  const std::vector<EmissiveTriangle>& emissive() const { return emissive_; }
+  const EnvironmentLight& environment() const { return environment_; }
+  const World& world() const { return world_; }
+  bool IsEmissive(int light) const { return light >= static_cast<int>(locals_.size()); }
+
+  // The local light of an emissive triangle, or -1.
+  int LightOfTriangle(uint32_t triangle) const;
+
+  // A point of local light `light` as seen from `position`. pdf: uniform in solid angle for near triangles, in area for
+  // far ones, as PdfLocal says.
+  LightSample SampleLocal(int light, Vec3f position, Vec2f u) const;
+  // Density per steradian with which SampleLocal draws the point of `triangle` at distance t along unit `dir`.
+  float PdfLocal(int light, Vec3f position, Vec3f dir, float t) const;
+  LightSample SampleDirectional(int directional, Vec2f u) const;
+  LightSample SampleEnvironment(Vec2f u) const;
+
+  // About the unoccluded irradiance (luminance) that a local light brings to the points within `radius` of `position` on
+  // a plane with unit `normal` (zero: any orientation), to choose among lights. Exactly 0 only where the light reaches
+  // no such point.
+  float Importance(int light, Vec3f position, Vec3f normal, float radius) const;
+  // Radiated flux (luminance) [W].
+  float Power(int light) const;
+
+ private:
+  LightSample SampleTriangle(const EmissiveTriangle& light, Vec3f position, Vec2f u) const;
+  float ImportanceOfTriangle(const EmissiveTriangle& light, Vec3f position, Vec3f normal, float radius) const;
+
+  const World& world_;
+  std::vector<PunctualLight> locals_, directionals_;
+  std::vector<EmissiveTriangle> emissive_;
+  std::vector<int> light_of_triangle_;  // one per triangle, empty where nothing emits
+  EnvironmentLight environment_;
+};
+
+// clamp((cos t - cos outer)/(cos inner - cos outer), 0, 1)^2, KHR_lights_punctual's recommendation; 1 for point lights.
+float SpotFalloff(const PunctualLight& light, float cos_angle);
+
+// The shadow ray from a surface point to a light sample.
+Ray ShadowRay(const SurfacePoint& from, const LightSample& sample, uint32_t key);
+
+}  // namespace bakewell

@@ -1,0 +1,179 @@
+#include "worker/photon/guide.h"
+
+#include <cmath>
+#include <limits>
+
+#include "worker/sample/sobol.h"
+#include "worker/sample/warp.h"
+#include "worker/texel/sampler.h"
+
+namespace bakewell {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr int kMaxWalk = 5;
+
+int Bin(float unit, int grid) { return std::clamp(static_cast<int>((unit * 0.5f + 0.5f) * static_cast<float>(grid)), 0, grid - 1); }
+
+// Adds every bin's eight neighbours, so that the edge of a window is not lost between marks.
+std::vector<float> Widen(std::span<const float> bins, int grid) {
+  std::vector<float> wide(bins.size(), 0.0f);
+  for (int y = 0; y < grid; ++y) {
+    for (int x = 0; x < grid; ++x) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          const int nx = x + dx, ny = y + dy;
+          if (nx < 0 || ny < 0 || nx >= grid || ny >= grid) continue;
+          wide[static_cast<size_t>(y * grid + x)] += bins[static_cast<size_t>(ny * grid + nx)] * (dx == 0 && dy == 0 ? 1.0f : 0.25f);
+        }
+      }
+    }
+  }
+  return wide;
+}
+
+// A density that is `share` uniform and otherwise follows sqrt of the marks (between flat over what is lit and in
+// proportion to it). Uniform where nothing was marked.
+std::vector<float> Mix(const std::vector<float>& marks, float share) {
+  double total = 0;
+  std::vector<float> density(marks.size());
+  for (size_t i = 0; i < marks.size(); ++i) total += static_cast<double>(density[i] = std::sqrt(marks[i]));
+  const double uniform = 1.0 / static_cast<double>(marks.size());
+  for (float& d : density) {
+    d = static_cast<float>(total > 0 ? share * uniform + (1 - share) * static_cast<double>(d) / total : uniform);
+  }
+  return density;
+}
+
+float UsefulShare(const std::vector<float>& marks) {
+  size_t used = 0;
+  for (const float m : marks) used += m > 0 ? 1 : 0;
+  return std::max(static_cast<float>(used) / static_cast<float>(marks.size()), 1e-3f);
+}
+
+}  // namespace
+
+Frame SkyFrame(Vec3f dir) { return FrameFromNormal(dir); }
+Frame SunFrame(const PunctualLight& light) { return FrameFromHint(-light.direction, light.tangent); }
+
+struct EmissionGuide::Marks {
+  std::vector<std::vector<float>> sun;  // per directional light, kSunGrid^2
+  std::vector<float> sky;               // bins x kSkyGrid^2
+};
+
+namespace {
+
+Vec2f OnSquare(const World& world, const Frame& frame, Vec3f p) {
+  const Vec3f d = p - world.center();
+  return {Dot(d, frame.t) / world.radius(), Dot(d, frame.b) / world.radius()};
+}
+
+}  // namespace
+
+int EmissionGuide::SkyBin(int x, int y) const { return (y * kSkyRows / sky_height_) * kSkyColumns + x * kSkyColumns / sky_width_; }
+
+EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, const AtlasLayout& layout, const TexelMap& map,
+                                   int walks, uint32_t seed) {
+  EmissionGuide guide;
+  guide.sky_width_ = lights.environment().width();
+  guide.sky_height_ = lights.environment().height();
+  Marks marks;
+  marks.sun.assign(lights.directionals().size(), std::vector<float>(kSunGrid * kSunGrid, 0.0f));
+  marks.sky.assign(static_cast<size_t>(kSkyColumns) * kSkyRows * kSkyGrid * kSkyGrid, 0.0f);
+  const bool needed = !lights.directionals().empty() || lights.environment().bright();
+  if (!needed || map.texels.empty()) walks = 0;
+  const auto mark_sun = [&](const SurfacePoint& point, uint32_t key) {
+    for (size_t s = 0; s < lights.directionals().size(); ++s) {
+      const PunctualLight& sun = lights.directionals()[s];
+      const float cosine = -Dot(sun.direction, point.normal);
+      if (cosine <= 0 || world.Occluded({RayOrigin(point), -sun.direction, kInfinity, key})) continue;
+      const Vec2f p = OnSquare(world, SunFrame(sun), point.position);
+      marks.sun[s][static_cast<size_t>(Bin(p.y, kSunGrid) * kSunGrid + Bin(p.x, kSunGrid))] += cosine;
+    }
+  };
+  const auto mark_sky = [&](Vec3f from, Vec3f dir) {
+    if (!lights.environment().bright()) return;
+    const float phi = std::atan2(dir.z, dir.x) / (2 * kPiF), v = std::acos(std::clamp(dir.y, -1.0f, 1.0f)) / kPiF;
+    const int x = std::clamp(static_cast<int>((phi < 0 ? phi + 1 : phi) * static_cast<float>(guide.sky_width_)), 0, guide.sky_width_ - 1);
+    const int y = std::clamp(static_cast<int>(v * static_cast<float>(guide.sky_height_)), 0, guide.sky_height_ - 1);
+    const Vec2f p = OnSquare(world, SkyFrame(dir), from);
+    marks.sky[static_cast<size_t>((guide.SkyBin(x, y) * kSkyGrid + Bin(p.y, kSkyGrid)) * kSkyGrid + Bin(p.x, kSkyGrid))] += 1;
+  };
+  for (int walk = 0; walk < walks; ++walk) {
+    const uint32_t key = HashCombine(HashCombine(seed, 0x6a1d3u), static_cast<uint32_t>(walk));
+    const auto random = [&](int i) { return UnitFloat(HashCombine(key, static_cast<uint32_t>(i))); };
+    const size_t which = std::min(map.texels.size() - 1, static_cast<size_t>(random(0) * static_cast<float>(map.texels.size())));
+    const TexelPoint start = TexelSampler(world, layout, map, map.texels[which]).At({random(1), random(2)});
+    SurfacePoint at = start.surface;
+    Frame frame = start.frame;
+    for (int step = 0; step < kMaxWalk; ++step) {
+      const Vec3f dir = frame.ToWorld(CosineHemisphere({random(10 * step + 10), random(10 * step + 11)}));
+      const Hit hit = world.Intersect({RayOrigin(at), dir, kInfinity, key + static_cast<uint32_t>(step)});
+      if (!hit) {
+        if (step > 0) mark_sky(at.position, dir);
+        break;
+      }
+      at = world.PointAt(hit);
+      mark_sun(at, key);
+      if (random(10 * step + 12) >= MaxComponent(world.AlbedoAt(hit))) break;
+      frame = FrameFromHint(at.normal, world.triangles()[hit.triangle].e1);
+    }
+  }
+  guide.Finish(lights, marks);
+  return guide;
+}
+
+void EmissionGuide::Finish(const LightSet& lights, const Marks& marks) {
+  for (const auto& bins : marks.sun) {
+    const std::vector<float> wide = Widen(bins, kSunGrid);
+    sun_.emplace_back(kSunGrid, kSunGrid, Mix(wide, kUniformShare));
+    sun_useful_.push_back(UsefulShare(wide));
+  }
+  if (lights.environment().bright()) FinishSky(lights.environment(), marks);
+}
+
+void EmissionGuide::FinishSky(const EnvironmentLight& sky, const Marks& marks) {
+  constexpr size_t kPerBin = kSkyGrid * kSkyGrid;
+  constexpr size_t kBins = static_cast<size_t>(kSkyColumns) * kSkyRows;
+  std::vector<float> useful(kBins);
+  for (size_t bin = 0; bin < kBins; ++bin) {
+    const std::vector<float> wide = Widen(std::span(marks.sky).subspan(bin * kPerBin, kPerBin), kSkyGrid);
+    sky_position_.emplace_back(kSkyGrid, kSkyGrid, Mix(wide, kUniformShare));
+    useful[bin] = UsefulShare(wide);
+  }
+  std::vector<float> weights;
+  double useful_flux = 0, flux = 0;
+  for (int y = 0; y < sky_height_; ++y) {
+    for (int x = 0; x < sky_width_; ++x) {
+      const Rgb radiance = sky.Radiance(sky.CellCenter(x, y));
+      const float power = (Luminance(radiance) + 1e-3f * MaxComponent(radiance)) * sky.CellSolidAngle(y);
+      const float share = useful[static_cast<size_t>(SkyBin(x, y))];
+      weights.push_back(power * (share + 0.02f));
+      useful_flux += static_cast<double>(power * share);
+      flux += static_cast<double>(power);
+    }
+  }
+  sky_direction_ = Distribution2D(sky_width_, sky_height_, weights);
+  sky_useful_ = flux > 0 ? static_cast<float>(useful_flux / flux) : 1.0f;
+}
+
+EmissionGuide::SquarePoint EmissionGuide::Draw(const Distribution2D& table, Vec2f u) {
+  const auto drawn = table.Draw(u);
+  return {{2 * drawn.position.x - 1, 2 * drawn.position.y - 1}, drawn.pdf};
+}
+
+EmissionGuide::SkyPoint EmissionGuide::DrawSky(Vec2f u_direction, Vec2f u_position) const {
+  const auto cell = sky_direction_.Draw(u_direction);
+  const float step = kPiF / static_cast<float>(sky_height_);
+  const float top = std::cos(static_cast<float>(cell.y) * step), bottom = std::cos(static_cast<float>(cell.y + 1) * step);
+  const float within = cell.position.y * static_cast<float>(sky_height_) - static_cast<float>(cell.y);
+  const float y = top + (bottom - top) * within;
+  const float s = std::sqrt(std::max(0.0f, 1 - y * y)), phi = cell.position.x * 2 * kPiF;
+  const float solid_angle = (top - bottom) * 2 * kPiF / static_cast<float>(sky_width_);
+  const float cells = static_cast<float>(sky_width_) * static_cast<float>(sky_height_);
+  SkyPoint point{{s * std::cos(phi), y, s * std::sin(phi)}, cell.pdf / cells / solid_angle, {}};
+  point.point = Draw(sky_position_[static_cast<size_t>(SkyBin(cell.x, cell.y))], u_position);
+  return point;
+}
+
+}  // namespace bakewell

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <vector>
+
+#include "core/artifact/progress.h"
+#include "worker/light/lights.h"
+#include "worker/sample/distribution.h"
+#include "worker/texel/texels.h"
+
+namespace bakewell {
+
+// Where photons of the sun and the sky are worth emitting. Distant light is emitted from a square of side 2R behind the
+// scene's bounding sphere, across its direction; most of it would end on roofs that no texel sees. A pilot walks from
+// texels into the scene (importance runs backwards, Peter & Pietrek 1998) and, at every surface that a texel sees,
+// marks from which part of the square, and for the sky from which direction, light arrives. Emission follows the marks,
+// widened by one bin, with a share kept uniform, so that nothing is ever missed: the estimate stays unbiased.
+class EmissionGuide {
+ public:
+  static constexpr int kSunGrid = 64, kSkyGrid = 16, kSkyColumns = 16, kSkyRows = 8;
+  static constexpr float kUniformShare = 0.1f;
+
+  // walks: number of pilot paths. Keyed by seed.
+  static EmissionGuide Learn(const World& world, const LightSet& lights, const AtlasLayout& layout, const TexelMap& map,
+                             int walks, uint32_t seed);
+
+  struct SquarePoint {
+    Vec2f position;        // in [-1, 1]^2, in units of R
+    float density = 0;     // relative to uniform (1 = uniform)
+  };
+  SquarePoint DrawSun(int directional, Vec2f u) const { return Draw(sun_[directional], u); }
+  struct SkyPoint {
+    Vec3f dir;             // unit, towards the sky
+    float pdf = 0;         // per steradian
+    SquarePoint point;
+  };
+  SkyPoint DrawSky(Vec2f u_direction, Vec2f u_position) const;
+
+  // Share of the square's area (sun) or of the sky's flux that reaches what texels see, (0, 1].
+  float UsefulSun(int directional) const { return sun_useful_[directional]; }
+  float UsefulSky() const { return sky_useful_; }
+
+ private:
+  struct Marks;
+  static SquarePoint Draw(const Distribution2D& table, Vec2f u);
+  int SkyBin(int x, int y) const;
+  void Finish(const LightSet& lights, const Marks& marks);
+  void FinishSky(const EnvironmentLight& sky, const Marks& marks);
+
+  std::vector<Distribution2D> sun_;
+  std::vector<float> sun_useful_;
+  Distribution2D sky_direction_;         // over the environment's table
+  std::vector<Distribution2D> sky_position_;  // per direction bin
+  int sky_width_ = 1, sky_height_ = 1;
+  float sky_useful_ = 1;
+};
+
+// Emission frame across unit `dir` (towards the light) for the sky; the sun uses its own tangent.
+Frame SkyFrame(Vec3f dir);
+Frame SunFrame(const PunctualLight& light);
+
+}  // namespace bakewell

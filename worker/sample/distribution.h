@@ -1,0 +1,54 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/math/vec.h"
+
+namespace bakewell {
+
+// A piecewise constant density over n cells of [0, 1), sampled by inverting its CDF (keeps the stratification of u).
+class Distribution1D {
+ public:
+  Distribution1D() = default;
+  // Weights >= 0, finite. All zero gives the uniform density.
+  explicit Distribution1D(std::span<const float> weights);
+
+  struct Sample {
+    int index = 0;
+    float probability = 0;  // of the index
+    float remainder = 0;    // u within the cell, uniform in [0, 1) again
+  };
+  Sample Draw(float u) const;
+  float Probability(int index) const { return static_cast<float>(cdf_[index + 1] - cdf_[index]); }
+  int size() const { return static_cast<int>(cdf_.size()) - 1; }
+  double total() const { return total_; }  // sum of the weights
+
+ private:
+  std::vector<double> cdf_{0, 1};
+  double total_ = 0;
+};
+
+// A piecewise constant density over a width x height grid on the unit square.
+class Distribution2D {
+ public:
+  Distribution2D() = default;
+  Distribution2D(int width, int height, std::span<const float> weights);
+
+  struct Sample {
+    int x = 0, y = 0;
+    Vec2f position;    // in the unit square
+    float pdf = 0;     // per unit square area
+  };
+  Sample Draw(Vec2f u) const;
+  float Pdf(int x, int y) const;
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+ private:
+  int width_ = 1, height_ = 1;
+  Distribution1D marginal_;            // rows
+  std::vector<Distribution1D> rows_;   // columns in each row
+};
+
+}  // namespace bakewell

@@ -1,0 +1,94 @@
+#include "worker/texel/validity.h"
+
+#include <limits>
+
+#include "worker/sample/sobol.h"
+#include "worker/sample/warp.h"
+
+namespace bakewell {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr int kFirstRays = 8, kInsideRays = 16, kPlaces = 16;
+
+bool MeetsBack(const World& world, const Hit& hit) {
+  return hit && hit.back && !world.MaterialOf(world.triangles()[hit.triangle]).double_sided;
+}
+
+// Share of `count` cosine-weighted rays that meet a back face first.
+float BackShare(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, int count, int& rays) {
+  int backs = 0;
+  for (int i = 0; i < count; ++i) {
+    const Vec3f dir = frame.ToWorld(CosineHemisphere(set.Get2(static_cast<uint32_t>(i), 0)));
+    backs += MeetsBack(world, world.Intersect({RayOrigin(from), dir, kInfinity, set.key()})) ? 1 : 0;
+  }
+  rays += count;
+  return static_cast<float>(backs) / static_cast<float>(count);
+}
+
+// The four directions along the surface in which a texel looks for walls.
+std::array<Vec3f, 4> Tangents(const Frame& frame) { return {frame.t, -frame.t, frame.b, -frame.b}; }
+
+// Something within the texel's own reach: a wall that stands on it, a box that covers part of it.
+bool Crowded(const World& world, const TexelPoint& center, float radius, int& rays) {
+  for (const Vec3f dir : Tangents(center.frame)) {
+    ++rays;
+    if (world.Intersect({RayOrigin(center.surface), dir, radius, 0})) return true;
+  }
+  return false;
+}
+
+uint16_t ProbeMask(const World& world, const TexelSampler& sampler, const SobolSet& set, TexelValidity& result) {
+  uint16_t tested = 0, valid = 0;
+  float backs = 0;
+  for (int i = 0; i < kPlaces; ++i) {
+    const Vec2f u{(static_cast<float>(i % 4) + 0.5f) / 4, (static_cast<float>(i / 4) + 0.5f) / 4};
+    const TexelPoint point = sampler.At(u);
+    const float share = BackShare(world, point.surface, point.frame, set, kInsideRays, result.rays);
+    backs += share;
+    const uint16_t bit = static_cast<uint16_t>(1U << sampler.BitAt(u));
+    tested |= bit;
+    if (share <= 0.5f) valid |= bit;
+  }
+  result.backface_share = backs / kPlaces;
+  if (valid == 0) return 0;
+  return static_cast<uint16_t>(valid | static_cast<uint16_t>(~tested));
+}
+
+// A place past the nearest back face within one texel diagonal that is outside, if there is one.
+bool PushOut(const World& world, TexelSampler& sampler, const SobolSet& set, TexelValidity& result) {
+  const TexelPoint center = sampler.At({0.5f, 0.5f});
+  const float reach = 2 * sampler.radius();
+  for (const Vec3f dir : Tangents(center.frame)) {
+    ++result.rays;
+    const Hit hit = world.Intersect({RayOrigin(center.surface), dir, reach, 0});
+    if (!MeetsBack(world, hit)) continue;
+    SurfacePoint moved = center.surface;
+    moved.position += dir * (hit.t * 1.001f + 4 * moved.offset);
+    if (BackShare(world, moved, center.frame, set, kInsideRays, result.rays) > 0.5f) continue;
+    sampler.MoveTo(moved.position);
+    return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+TexelValidity ProbeValidity(const World& world, uint32_t key, TexelSampler& sampler) {
+  TexelValidity result;
+  if (world.backfaces() == BackfaceMode::kPass) return result;
+  const SobolSet set(HashCombine(key, 0x7a11du));
+  const TexelPoint center = sampler.At({0.5f, 0.5f});
+  result.backface_share = BackShare(world, center.surface, center.frame, set, kFirstRays, result.rays);
+  if (result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) return result;
+  const uint16_t mask = ProbeMask(world, sampler, set, result);
+  if (mask != 0) {
+    sampler.set_valid_mask(mask);
+    return result;
+  }
+  result.pushed_out = PushOut(world, sampler, set, result);
+  result.valid = result.pushed_out;
+  return result;
+}
+
+}  // namespace bakewell

@@ -1,0 +1,82 @@
+#include "worker/trace/texture.h"
+
+#include <array>
+#include <cmath>
+
+namespace bakewell {
+namespace {
+
+float DecodeSrgb(int value) {
+  const double c = value / 255.0;
+  return static_cast<float>(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4));
+}
+
+const std::array<float, 256> kSrgb = [] {
+  std::array<float, 256> table{};
+  for (int i = 0; i < 256; ++i) table[i] = DecodeSrgb(i);
+  return table;
+}();
+
+Vec2f Transform(const TextureRef& ref, Vec2f uv) {
+  const Vec2f scaled{uv.x * ref.scale.x, uv.y * ref.scale.y};
+  const float c = std::cos(ref.rotation_rad), s = std::sin(ref.rotation_rad);
+  return {ref.offset.x + c * scaled.x + s * scaled.y, ref.offset.y - s * scaled.x + c * scaled.y};
+}
+
+int Wrap(int i, int size, WrapMode mode) {
+  if (mode == WrapMode::kClampToEdge) return std::clamp(i, 0, size - 1);
+  const int period = mode == WrapMode::kRepeat ? size : 2 * size;
+  const int m = ((i % period) + period) % period;
+  return m < size ? m : period - 1 - m;
+}
+
+const uint8_t* TexelAt(const Texture& texture, int x, int y) {
+  const size_t column = static_cast<size_t>(Wrap(x, texture.width, texture.wrap_u));
+  const size_t row = static_cast<size_t>(Wrap(y, texture.height, texture.wrap_v));
+  return texture.rgba.data() + 4 * (row * static_cast<size_t>(texture.width) + column);
+}
+
+// Brings a coordinate into a range whose texel index fits an int, whatever the wrap mode.
+float Bound(float u, WrapMode mode) {
+  if (!std::isfinite(u)) return 0;
+  if (mode == WrapMode::kClampToEdge) return std::clamp(u, 0.0f, 1.0f);
+  return u - 2.0f * std::floor(0.5f * u);
+}
+
+// Calls add(texel, weight) for the texels under the filter.
+template <typename Add>
+void Filter(const Texture& texture, const TextureRef& ref, Vec2f uv, Add add) {
+  if (texture.width <= 0 || texture.height <= 0) return;
+  const Vec2f p = Transform(ref, uv);
+  const float x = Bound(p.x, texture.wrap_u) * static_cast<float>(texture.width);
+  const float y = Bound(p.y, texture.wrap_v) * static_cast<float>(texture.height);
+  if (texture.nearest) {
+    add(TexelAt(texture, static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y))), 1.0f);
+    return;
+  }
+  const float fx = std::floor(x - 0.5f), fy = std::floor(y - 0.5f);
+  const float wx = x - 0.5f - fx, wy = y - 0.5f - fy;
+  const int ix = static_cast<int>(fx), iy = static_cast<int>(fy);
+  add(TexelAt(texture, ix, iy), (1 - wx) * (1 - wy));
+  add(TexelAt(texture, ix + 1, iy), wx * (1 - wy));
+  add(TexelAt(texture, ix, iy + 1), (1 - wx) * wy);
+  add(TexelAt(texture, ix + 1, iy + 1), wx * wy);
+}
+
+}  // namespace
+
+Rgb SampleColor(const Texture& texture, const TextureRef& ref, Vec2f uv) {
+  Rgb sum;
+  Filter(texture, ref, uv, [&](const uint8_t* texel, float weight) {
+    sum += Rgb{kSrgb[texel[0]], kSrgb[texel[1]], kSrgb[texel[2]]} * weight;
+  });
+  return sum;
+}
+
+float SampleAlpha(const Texture& texture, const TextureRef& ref, Vec2f uv) {
+  float sum = 0;
+  Filter(texture, ref, uv, [&](const uint8_t* texel, float weight) { sum += static_cast<float>(texel[3]) / 255.0f * weight; });
+  return sum;
+}
+
+}  // namespace bakewell

@@ -1,0 +1,246 @@
+#include "worker/trace/world.h"
+
+#include <embree3/rtcore.h>
+
+#include <cstring>
+#include <limits>
+
+#include "core/base/check.h"
+#include "worker/sample/hash.h"
+#include "worker/trace/texture.h"
+
+namespace bakewell {
+
+struct World::Device {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+  ~Device() {
+    if (scene) rtcReleaseScene(scene);
+    if (device) rtcReleaseDevice(device);
+  }
+};
+
+struct World::TraceContext {
+  RTCIntersectContext rtc;
+  const World* world;
+  uint32_t key;
+};
+
+World::World(const Scene& scene, BackfaceMode backfaces, float albedo_limit)
+    : scene_(scene), backfaces_(backfaces), albedo_limit_(albedo_limit), device_(std::make_unique<Device>()) {}
+
+World::~World() = default;
+
+absl::StatusOr<std::unique_ptr<World>> World::Build(const Scene& scene, BackfaceMode backfaces, float albedo_limit) {
+  std::unique_ptr<World> world(new World(scene, backfaces, albedo_limit));
+  BAKEWELL_RETURN_IF_ERROR(world->BuildTriangles());
+  BAKEWELL_RETURN_IF_ERROR(world->BuildDevice());
+  return world;
+}
+
+namespace {
+
+// False for triangles without area or with coordinates that are not numbers.
+bool MakeTriangle(const Object& object, uint32_t k, Triangle& triangle) {
+  const Vec3f p0 = object.position[object.index[3 * k]];
+  const Vec3f p1 = object.position[object.index[3 * k + 1]];
+  const Vec3f p2 = object.position[object.index[3 * k + 2]];
+  triangle.p0 = p0;
+  triangle.e1 = p1 - p0;
+  triangle.e2 = p2 - p0;
+  const Vec3d normal = NormalizeOrZero(Cross(ToDouble(triangle.e1), ToDouble(triangle.e2)));
+  triangle.normal = ToFloat(normal);
+  triangle.index_in_object = k;
+  triangle.material = static_cast<uint16_t>(object.material);
+  return Dot(normal, normal) > 0.5 && IsFinite(p0) && IsFinite(p1) && IsFinite(p2);
+}
+
+bool IsOpaque(const Material& material, BackfaceMode backfaces) {
+  return material.alpha_mode == AlphaMode::kOpaque && (backfaces != BackfaceMode::kPass || material.double_sided);
+}
+
+}  // namespace
+
+absl::Status World::BuildTriangles() {
+  if (scene_.materials.size() > std::numeric_limits<uint16_t>::max()) {
+    return absl::InvalidArgumentError("the scene has more than 65,535 materials; merge some");
+  }
+  size_t total = 0;
+  for (const Object& object : scene_.objects) total += object.index.size() / 3;
+  if (total >= kNoTriangle) return absl::InvalidArgumentError("the scene has more than 2^32 - 2 triangles; split it");
+  triangles_.reserve(total);
+  for (const bool opaque : {true, false}) {
+    for (uint32_t o = 0; o < scene_.objects.size(); ++o) {
+      const Object& object = scene_.objects[o];
+      if (IsOpaque(scene_.materials[object.material], backfaces_) != opaque) continue;
+      for (uint32_t k = 0; k < object.index.size() / 3; ++k) {
+        Triangle triangle;
+        triangle.object = o;
+        if (MakeTriangle(object, k, triangle)) triangles_.push_back(triangle);
+      }
+    }
+    if (opaque) opaque_count_ = static_cast<uint32_t>(triangles_.size());
+  }
+  Vec3d sum;
+  for (const Triangle& t : triangles_) sum += ToDouble(t.p0) * 3.0 + ToDouble(t.e1) + ToDouble(t.e2);
+  center_ = triangles_.empty() ? Vec3f{} : ToFloat(sum / (3.0 * static_cast<double>(triangles_.size())));
+  for (const Triangle& t : triangles_) {
+    for (const Vec3f p : {t.p0, t.p0 + t.e1, t.p0 + t.e2}) radius_ = std::max(radius_, Length(p - center_));
+  }
+  return absl::OkStatus();
+}
+
+void World::AddGeometry(uint32_t begin, uint32_t end, bool filtered) {
+  if (begin == end) return;
+  const size_t count = end - begin;
+  RTCGeometry geometry = rtcNewGeometry(device_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                               3 * sizeof(float), 3 * count));
+  auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                 3 * sizeof(uint32_t), count));
+  for (size_t k = 0; k < count; ++k) {
+    const Triangle& t = triangles_[begin + k];
+    const Object& object = scene_.objects[t.object];
+    for (size_t corner = 0; corner < 3; ++corner) {
+      const Vec3f p = object.position[object.index[3 * t.index_in_object + corner]];
+      std::memcpy(vertices + 9 * k + 3 * corner, &p, sizeof p);
+      indices[3 * k + corner] = static_cast<uint32_t>(3 * k + corner);
+    }
+  }
+  if (filtered) {
+    rtcSetGeometryIntersectFilterFunction(geometry, &World::Filter);
+    rtcSetGeometryOccludedFilterFunction(geometry, &World::Filter);
+  }
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(device_->scene, geometry, filtered ? 1 : 0);
+  rtcReleaseGeometry(geometry);
+}
+
+absl::Status World::BuildDevice() {
+  device_->device = rtcNewDevice("threads=1,isa=avx2");
+  if (!device_->device) return absl::InternalError("Embree cannot start: this processor has no AVX2");
+  device_->scene = rtcNewScene(device_->device);
+  rtcSetSceneFlags(device_->scene, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(device_->scene, RTC_BUILD_QUALITY_MEDIUM);
+  AddGeometry(0, opaque_count_, false);
+  AddGeometry(opaque_count_, static_cast<uint32_t>(triangles_.size()), true);
+  rtcCommitScene(device_->scene);
+  if (rtcGetDeviceError(device_->device) != RTC_ERROR_NONE) {
+    return absl::ResourceExhaustedError("Embree could not build its tree: not enough memory for this scene");
+  }
+  return absl::OkStatus();
+}
+
+void World::Filter(const RTCFilterFunctionNArguments* arguments) {
+  BAKEWELL_CHECK(arguments->N == 1);
+  if (*arguments->valid == 0) return;
+  const auto* context = reinterpret_cast<const TraceContext*>(arguments->context);
+  const auto* ray = reinterpret_cast<const RTCRay*>(arguments->ray);
+  const auto* hit = reinterpret_cast<const RTCHit*>(arguments->hit);
+  const uint32_t triangle = context->world->opaque_count_ + hit->primID;
+  const Vec3f dir{ray->dir_x, ray->dir_y, ray->dir_z};
+  if (context->world->Passes(triangle, hit->u, hit->v, dir, context->key)) *arguments->valid = 0;
+}
+
+bool World::Passes(uint32_t triangle, float u, float v, Vec3f dir, uint32_t key) const {
+  const Triangle& t = triangles_[triangle];
+  const Material& material = MaterialOf(t);
+  if (backfaces_ == BackfaceMode::kPass && !material.double_sided && Dot(dir, t.normal) > 0) return true;
+  if (material.alpha_mode == AlphaMode::kOpaque) return false;
+  float alpha = material.base_alpha;
+  if (material.base_texture.texture >= 0) {
+    const Vec2f uv = TexcoordAt(t, material.base_texture.texcoord, u, v);
+    alpha *= SampleAlpha(scene_.textures[material.base_texture.texture], material.base_texture, uv);
+  }
+  if (material.alpha_mode == AlphaMode::kMask) return alpha < material.alpha_cutoff;
+  return UnitFloat(HashCombine(key, triangle)) >= alpha;
+}
+
+Hit World::Intersect(const Ray& ray) const {
+  TraceContext context;
+  rtcInitIntersectContext(&context.rtc);
+  context.world = this;
+  context.key = ray.key;
+  RTCRayHit query;
+  query.ray = {ray.origin.x, ray.origin.y, ray.origin.z, 0, ray.dir.x, ray.dir.y, ray.dir.z, 0, ray.t_max, ~0u, 0, 0};
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(device_->scene, &context.rtc, &query);
+  Hit hit;
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
+  hit.triangle = query.hit.primID + (query.hit.geomID == 1 ? opaque_count_ : 0);
+  hit.t = query.ray.tfar;
+  hit.u = query.hit.u;
+  hit.v = query.hit.v;
+  hit.back = Dot(ray.dir, triangles_[hit.triangle].normal) > 0;
+  return hit;
+}
+
+bool World::Occluded(const Ray& ray) const {
+  TraceContext context;
+  rtcInitIntersectContext(&context.rtc);
+  context.world = this;
+  context.key = ray.key;
+  RTCRay query{ray.origin.x, ray.origin.y, ray.origin.z, 0, ray.dir.x, ray.dir.y, ray.dir.z, 0, ray.t_max, ~0u, 0, 0};
+  rtcOccluded1(device_->scene, &context.rtc, &query);
+  return query.tfar < 0;
+}
+
+namespace {
+
+float MaxAbs(Vec3f a) { return std::max(std::fabs(a.x), std::max(std::fabs(a.y), std::fabs(a.z))); }
+
+// 2^-24 is half an ulp of 1. p0 + u e1 + v e2 is off by at most about 4 of them per coordinate, the intersection's
+// plane by about 8; the rest is margin for grazing starts.
+constexpr float kOffsetRelative = 32.0f / 16777216.0f;
+
+}  // namespace
+
+SurfacePoint World::PointAt(uint32_t triangle, float u, float v, bool back) const {
+  const Triangle& t = triangles_[triangle];
+  SurfacePoint point;
+  point.position = t.p0 + t.e1 * u + t.e2 * v;
+  point.normal = back ? -t.normal : t.normal;
+  point.offset = kOffsetRelative * (MaxAbs(t.p0) + MaxAbs(t.e1) + MaxAbs(t.e2));
+  return point;
+}
+
+SurfacePoint World::PointAt(const Hit& hit) const { return PointAt(hit.triangle, hit.u, hit.v, hit.back); }
+
+Vec2f World::TexcoordAt(const Triangle& triangle, int set, float u, float v) const {
+  const Object& object = scene_.objects[triangle.object];
+  const std::vector<Vec2f>& uv = set == 0 ? object.uv0 : object.uv1;
+  if (uv.empty()) return {};
+  const uint32_t* corner = object.index.data() + 3 * static_cast<size_t>(triangle.index_in_object);
+  return uv[corner[0]] * (1 - u - v) + uv[corner[1]] * u + uv[corner[2]] * v;
+}
+
+Rgb World::AlbedoAt(const Hit& hit) const {
+  const Triangle& t = triangles_[hit.triangle];
+  const Material& material = MaterialOf(t);
+  if (hit.back && backfaces_ == BackfaceMode::kAbsorb && !material.double_sided) return {};
+  Rgb albedo = material.base_color;
+  if (material.base_texture.texture >= 0) {
+    const Vec2f uv = TexcoordAt(t, material.base_texture.texcoord, hit.u, hit.v);
+    albedo = albedo * SampleColor(scene_.textures[material.base_texture.texture], material.base_texture, uv);
+  }
+  const auto limit = [this](float x) { return std::clamp(x, 0.0f, albedo_limit_); };
+  return {limit(albedo.x), limit(albedo.y), limit(albedo.z)};
+}
+
+bool World::Emits(uint32_t triangle) const { return MaxComponent(MaterialOf(triangles_[triangle]).emission) > 0; }
+
+Rgb World::FrontEmissionAt(uint32_t triangle, float u, float v) const {
+  const Triangle& t = triangles_[triangle];
+  const Material& material = MaterialOf(t);
+  if (material.emission_texture.texture < 0 || MaxComponent(material.emission) <= 0) return material.emission;
+  const Vec2f uv = TexcoordAt(t, material.emission_texture.texcoord, u, v);
+  return material.emission * SampleColor(scene_.textures[material.emission_texture.texture], material.emission_texture, uv);
+}
+
+Rgb World::EmissionAt(const Hit& hit) const {
+  if (hit.back && !MaterialOf(triangles_[hit.triangle]).double_sided) return {};
+  return FrontEmissionAt(hit.triangle, hit.u, hit.v);
+}
+
+}  // namespace bakewell
