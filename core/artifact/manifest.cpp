@@ -47,6 +47,8 @@ Json StatisticsJson(const Manifest& manifest) {
 
 }  // namespace
 
+std::string ProgramVersion() { return BAKEWELL_VERSION; }
+
 absl::StatusOr<ManifestFile> DescribeFile(const std::filesystem::path& path, std::string kind) {
   BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, ReadWholeFile(path));
   return ManifestFile{path.filename().string(), std::move(kind), bytes.size(),

@@ -11,6 +11,9 @@
 
 namespace bakewell {
 
+// The program's version, "0.1.0".
+std::string ProgramVersion();
+
 struct PhaseTime {
   std::string phase;  // as Progress::Report names it
   double wall_seconds = 0;
@@ -27,7 +30,7 @@ struct ManifestFile {
 // What manifest.json says; schema/manifest.md is its page.
 struct Manifest {
   std::string program = "bakewell";
-  std::string version;                       // of the program
+  std::string version = ProgramVersion();
   std::map<std::string, int> task_versions;  // kind of task to the version of its code
   std::string scene_file;                    // name only: the folder does not say where it was baked
   Digest scene_digest;                       // of the canonical scene

@@ -93,6 +93,11 @@ absl::Status CheckComplete(const Comparison& comparison) {
   if ((comparison.half_a == nullptr) != (comparison.half_b == nullptr)) {
     return absl::InvalidArgumentError("one half of the reference without the other");
   }
+  const Image &e = *comparison.candidate, &r = *comparison.reference;
+  if (e.width != r.width || e.height != r.height) {
+    return absl::InvalidArgumentError(absl::StrCat("sizes differ: the candidate is ", SizeText(e.width, e.height),
+                                                   ", the reference ", SizeText(r.width, r.height)));
+  }
   if (comparison.mask->Count() == 0) return absl::InvalidArgumentError("no texel is inside the mask");
   return absl::OkStatus();
 }

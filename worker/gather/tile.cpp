@@ -32,12 +32,12 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Ve
 // Everything about one texel while its tile is in flight.
 struct Work {
   TexelSampler sampler;
-  TileLights::Choice choice;
+  TileLights::Choice choice{};
   uint32_t key = 0;
   bool valid = true;
   float backface_share = 0;
   bool direct_active = true, indirect_active = true;
-  Accumulator direct, indirect;
+  Accumulator direct{}, indirect{};
   std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
   int direct_samples = 0, indirect_samples = 0;
 };

@@ -8,6 +8,8 @@
 #include "core/base/status.h"
 #include "core/scene/scene.h"
 
+struct RTCFilterFunctionNArguments;
+
 namespace bakewell {
 
 // One triangle in the scene's frame (relative to Scene::origin_ws) [m].
@@ -82,7 +84,7 @@ class World {
   absl::Status BuildTriangles();
   absl::Status BuildDevice();
   void AddGeometry(uint32_t begin, uint32_t end, bool filtered);
-  static void Filter(const struct RTCFilterFunctionNArguments* arguments);
+  static void Filter(const RTCFilterFunctionNArguments* arguments);
   bool Passes(uint32_t triangle, float u, float v, Vec3f dir, uint32_t key) const;
   Vec2f TexcoordAt(const Triangle& triangle, int set, float u, float v) const;
 

@@ -91,7 +91,8 @@ TEST(Compare, InputsThatCannotBeComparedAreNamed) {
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     return std::string(status.message());
   };
-  EXPECT_EQ(message({&small, &image, &mask}), "sizes differ: the candidate is 4 x 4, the mask 8 x 6");
+  EXPECT_EQ(message({&small, &image, &mask}), "sizes differ: the candidate is 4 x 4, the reference 8 x 6");
+  EXPECT_EQ(message({&small, &small, &mask}), "sizes differ: the candidate is 4 x 4, the mask 8 x 6");
   EXPECT_EQ(message({&image, &grey, &mask}), "the reference has no channel R");
   EXPECT_EQ(message({&image, &image, &nothing}), "no texel is inside the mask");
   EXPECT_EQ(message({&image, &image, &mask, &image}), "one half of the reference without the other");

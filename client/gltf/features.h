@@ -1,0 +1,12 @@
+#pragma once
+
+#include "client/gltf/file/accessor.h"
+#include "client/gltf/warnings.h"
+
+namespace bakewell::gltf {
+
+// kInvalidArgument for an extension that the file requires and bakewell does not know. Warnings for extensions that are
+// used and ignored, and for further scenes, vertex colours and cameras' likes that do not take part in a bake.
+absl::Status CheckFeatures(const Source& source, Warnings& warnings);
+
+}  // namespace bakewell::gltf
