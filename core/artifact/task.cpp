@@ -9,7 +9,7 @@ namespace {
 constexpr uint8_t kDigestInput = 0;
 constexpr uint8_t kOutputInput = 1;
 
-void WriteInput(const TaskInput& input, ByteWriter& writer) {
+void WriteInput(const TaskInput& input, FieldWriter& writer) {
   writer.PutString(input.name);
   if (const Digest* digest = std::get_if<Digest>(&input.source)) {
     writer.Put(kDigestInput);
@@ -22,7 +22,7 @@ void WriteInput(const TaskInput& input, ByteWriter& writer) {
   writer.PutString(made.output);
 }
 
-TaskInput ReadInput(ByteReader& reader) {
+TaskInput ReadInput(FieldReader& reader) {
   TaskInput input;
   input.name = reader.GetString();
   if (reader.Get<uint8_t>() == kDigestInput) {
@@ -48,7 +48,7 @@ constexpr size_t kMinOutputBytes = 4 + 32 + 8;
 
 }  // namespace
 
-void WriteSpec(const TaskSpec& spec, ByteWriter& writer) {
+void WriteSpec(const TaskSpec& spec, FieldWriter& writer) {
   writer.PutString(spec.kind);
   writer.Put(spec.code_version);
   writer.PutString(spec.settings);
@@ -56,14 +56,14 @@ void WriteSpec(const TaskSpec& spec, ByteWriter& writer) {
   for (const TaskInput& input : spec.inputs) WriteInput(input, writer);
 }
 
-TaskSpec ReadSpec(ByteReader& reader) {
+TaskSpec ReadSpec(FieldReader& reader) {
   TaskSpec spec;
   spec.kind = reader.GetString();
   spec.code_version = reader.Get<uint32_t>();
   spec.settings = reader.GetString();
   const uint32_t count = reader.Get<uint32_t>();
   if (count > kMaxTaskInputs || count > reader.remaining() / kMinInputBytes) {
-    reader = ByteReader({});
+    reader = FieldReader({});
     reader.Get<uint8_t>();
     return spec;
   }
@@ -73,13 +73,13 @@ TaskSpec ReadSpec(ByteReader& reader) {
 }
 
 std::string SerializeSpec(const TaskSpec& spec) {
-  ByteWriter writer;
+  FieldWriter writer;
   WriteSpec(spec, writer);
   return std::move(writer).bytes();
 }
 
 absl::StatusOr<TaskSpec> ParseSpec(std::string_view bytes) {
-  ByteReader reader(bytes);
+  FieldReader reader(bytes);
   TaskSpec spec = ReadSpec(reader);
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("task spec"));
   BAKEWELL_RETURN_IF_ERROR(CheckLimits(spec));
@@ -94,7 +94,7 @@ bool IsResolved(const TaskSpec& spec) {
 }
 
 std::string SerializeOutputs(const TaskOutputs& outputs) {
-  ByteWriter writer;
+  FieldWriter writer;
   writer.Put(static_cast<uint32_t>(outputs.size()));
   for (const TaskOutput& output : outputs) {
     writer.PutString(output.name);
@@ -105,7 +105,7 @@ std::string SerializeOutputs(const TaskOutputs& outputs) {
 }
 
 absl::StatusOr<TaskOutputs> ParseOutputs(std::string_view bytes) {
-  ByteReader reader(bytes);
+  FieldReader reader(bytes);
   const uint32_t count = reader.Get<uint32_t>();
   if (count > kMaxTaskOutputs || count > reader.remaining() / kMinOutputBytes) {
     return absl::DataLossError("task outputs: impossible count");

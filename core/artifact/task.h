@@ -6,7 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/base/byte_stream.h"
+#include "core/base/fields.h"
 #include "core/base/sha256.h"
 #include "core/base/status.h"
 
@@ -74,8 +74,8 @@ std::string SerializeOutputs(const TaskOutputs& outputs);
 absl::StatusOr<TaskOutputs> ParseOutputs(std::string_view bytes);
 
 // The same for a spec inside a longer stream; failures are left in `reader`.
-void WriteSpec(const TaskSpec& spec, ByteWriter& writer);
-TaskSpec ReadSpec(ByteReader& reader);
+void WriteSpec(const TaskSpec& spec, FieldWriter& writer);
+TaskSpec ReadSpec(FieldReader& reader);
 
 // A name that may become part of a file's path: 1 to 64 characters of [A-Za-z0-9_.-] and no leading dot; and "a/b" of
 // such parts, at most four, where a folder is wanted.

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/byte_stream.h"
+#include "core/base/fields.h"
 #include "core/base/sha256.h"
 #include "core/base/status.h"
 

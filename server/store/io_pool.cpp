@@ -8,13 +8,16 @@ IoPool::IoPool(int threads) {
   for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Loop(); });
 }
 
-IoPool::~IoPool() {
+IoPool::~IoPool() { Finish(); }
+
+void IoPool::Finish() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
   }
   wake_.notify_all();
   for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
 }
 
 void IoPool::Post(std::function<void()> work) {

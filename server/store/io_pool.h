@@ -16,6 +16,8 @@ class IoPool {
   explicit IoPool(int threads);
   ~IoPool();
   void Post(std::function<void()> work);
+  // Does what was posted and ends the threads; what is posted later is dropped.
+  void Finish();
 
  private:
   void Loop();

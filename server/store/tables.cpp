@@ -59,6 +59,16 @@ Tables::Tables(std::unique_ptr<SQLite::Database> database)
 
 Tables::~Tables() = default;
 
+absl::StatusOr<std::unique_ptr<Tables>> Tables::Open(const std::filesystem::path& path) {
+  BAKEWELL_ASSIGN_OR_RETURN(auto database, OpenDatabase(path));
+  return std::make_unique<Tables>(std::move(database));
+}
+
+absl::StatusOr<std::unique_ptr<Tables>> Tables::OpenReadOnly(const std::filesystem::path& path) {
+  BAKEWELL_ASSIGN_OR_RETURN(auto database, store::OpenReadOnly(path));
+  return std::make_unique<Tables>(std::move(database));
+}
+
 SQLite::Statement& Tables::Prepared(const char* sql) {
   auto& statement = cache_->statements[sql];
   if (!statement) statement = std::make_unique<SQLite::Statement>(*database_, sql);

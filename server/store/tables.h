@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -73,6 +74,9 @@ struct JobFilter {
 class Tables {
  public:
   explicit Tables(std::unique_ptr<SQLite::Database> database);
+  // On the connections of OpenDatabase() and OpenReadOnly().
+  static absl::StatusOr<std::unique_ptr<Tables>> Open(const std::filesystem::path& path);
+  static absl::StatusOr<std::unique_ptr<Tables>> OpenReadOnly(const std::filesystem::path& path);
   ~Tables();
 
   absl::Status Begin();

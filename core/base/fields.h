@@ -13,7 +13,7 @@ namespace bakewell {
 
 // Appends little-endian integers, length-prefixed strings and digests to a string: the canonical form that keys are
 // hashed from and database columns hold. One way to write a value, so equal values have equal bytes.
-class ByteWriter {
+class FieldWriter {
  public:
   template <std::unsigned_integral T>
   void Put(T value) {
@@ -29,11 +29,11 @@ class ByteWriter {
   std::string bytes_;
 };
 
-// Reads what ByteWriter wrote. Safe on hostile bytes: after a read past the end every value is zero or empty and ok()
+// Reads what FieldWriter wrote. Safe on hostile bytes: after a read past the end every value is zero or empty and ok()
 // stays false, so a decoder checks once, and checks counts against remaining() before it allocates. Borrows the bytes.
-class ByteReader {
+class FieldReader {
  public:
-  explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
+  explicit FieldReader(std::string_view bytes) : bytes_(bytes) {}
   template <std::unsigned_integral T>
   T Get() {
     const std::string_view part = Take(sizeof(T));

@@ -1,4 +1,4 @@
-#include "core/base/byte_stream.h"
+#include "core/base/fields.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -7,14 +7,14 @@
 
 namespace bakewell {
 
-void ByteWriter::PutString(std::string_view text) {
+void FieldWriter::PutString(std::string_view text) {
   Put(static_cast<uint32_t>(text.size()));
   bytes_.append(text);
 }
 
-void ByteWriter::PutDigest(const Digest& digest) { bytes_.append(DigestToBytes(digest)); }
+void FieldWriter::PutDigest(const Digest& digest) { bytes_.append(DigestToBytes(digest)); }
 
-std::string_view ByteReader::Take(size_t size_bytes) {
+std::string_view FieldReader::Take(size_t size_bytes) {
   if (size_bytes > bytes_.size()) {
     ok_ = false;
     bytes_ = {};
@@ -25,19 +25,19 @@ std::string_view ByteReader::Take(size_t size_bytes) {
   return part;
 }
 
-std::string ByteReader::GetString() {
+std::string FieldReader::GetString() {
   const uint32_t size_bytes = Get<uint32_t>();
   return std::string(Take(size_bytes));
 }
 
-Digest ByteReader::GetDigest() {
+Digest FieldReader::GetDigest() {
   Digest digest;
   const std::string_view part = Take(digest.bytes.size());
   std::memcpy(digest.bytes.data(), part.data(), part.size());
   return digest;
 }
 
-absl::Status ByteReader::Finish(std::string_view what) const {
+absl::Status FieldReader::Finish(std::string_view what) const {
   if (ok_ && bytes_.empty()) return absl::OkStatus();
   return absl::DataLossError(absl::StrCat(absl::string_view(what.data(), what.size()),
                                           ok_ ? ": bytes left over at the end" : ": ends too early"));
