@@ -6,7 +6,7 @@
 namespace bakewell::gltf {
 
 // kInvalidArgument for an extension that the file requires and bakewell does not know. Warnings for extensions that are
-// used and ignored, and for further scenes, vertex colours and cameras' likes that do not take part in a bake.
+// used and ignored, for further scenes and for vertex colours.
 absl::Status CheckFeatures(const Source& source, Warnings& warnings);
 
 }  // namespace bakewell::gltf

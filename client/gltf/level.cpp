@@ -29,6 +29,7 @@ class LevelLoader {
   absl::StatusOr<LoadedLevel> Load() {
     BAKEWELL_RETURN_IF_ERROR(CheckFeatures(source_, warnings_));
     BAKEWELL_ASSIGN_OR_RETURN(const std::vector<PlacedNode> nodes, PlaceNodes(source_));
+    for (const PlacedNode& node : nodes) BAKEWELL_RETURN_IF_ERROR(Charge(node.node));
     for (const PlacedNode& node : nodes) BAKEWELL_RETURN_IF_ERROR(AddNode(node));
     BAKEWELL_ASSIGN_OR_RETURN(const auto lights, ReadLights(source_, nodes, warnings_));
     BAKEWELL_ASSIGN_OR_RETURN(level_.scene.environment, ReadEnvironment(source_));
@@ -49,8 +50,7 @@ class LevelLoader {
       warnings_.Add(name + ": skinned meshes are skipped");
       return absl::OkStatus();
     }
-    const auto most = static_cast<uint64_t>(limits_.max_triangles);
-    BAKEWELL_ASSIGN_OR_RETURN(const Instances instances, ReadInstances(source_, placed.node, most));
+    BAKEWELL_ASSIGN_OR_RETURN(const Instances instances, ReadInstances(source_, placed.node));
     if (!instances.present) return AddMesh(placed.node, -1, placed.world_from_node);
     for (size_t i = 0; i < instances.node_from_instance.size(); ++i) {
       const Transform world = placed.world_from_node * instances.node_from_instance[i];
@@ -76,7 +76,6 @@ class LevelLoader {
   }
 
   absl::Status AddPrimitive(const ObjectSource& source, const Transform& world) {
-    BAKEWELL_RETURN_IF_ERROR(Charge(source));
     BAKEWELL_ASSIGN_OR_RETURN(const PrimitiveData* data, DataOf(source.mesh, source.primitive));
     WorldObject object = PlaceObject(*data, world);
     object.object.source = source;
@@ -91,18 +90,28 @@ class LevelLoader {
     return absl::OkStatus();
   }
 
-  // Before anything is allocated: does the scene stay within its limits?
-  absl::Status Charge(const ObjectSource& source) {
-    BAKEWELL_ASSIGN_OR_RETURN(const PrimitiveSize size, SizeOf(source_, source.mesh, source.primitive));
-    triangles_ += size.indices / 3;
-    vertices_ += HasNormals(source_, source.mesh, source.primitive) ? size.vertices : size.indices;
-    if (triangles_ <= static_cast<uint64_t>(limits_.max_triangles) &&
-        vertices_ <= static_cast<uint64_t>(limits_.max_vertices)) {
+  // Adds a node's mesh to what the scene will have, before anything is allocated for it.
+  absl::Status Charge(int node) {
+    const int mesh = source_.model.nodes[static_cast<size_t>(node)].mesh;
+    if (mesh < 0) return absl::OkStatus();
+    const uint64_t count = InstanceCount(source_, node);
+    const size_t primitives = source_.model.meshes[static_cast<size_t>(mesh)].primitives.size();
+    for (int p = 0; p < static_cast<int>(primitives); ++p) {
+      if (SkipReason(source_, mesh, p)) continue;
+      BAKEWELL_ASSIGN_OR_RETURN(const PrimitiveSize size, SizeOf(source_, mesh, p));
+      triangles_ += static_cast<double>(count) * static_cast<double>(size.indices / 3);
+      vertices_ +=
+          static_cast<double>(count) * static_cast<double>(HasNormals(source_, mesh, p) ? size.vertices : size.indices);
+    }
+    if (triangles_ <= static_cast<double>(limits_.max_triangles) &&
+        vertices_ <= static_cast<double>(limits_.max_vertices) &&
+        count <= static_cast<uint64_t>(limits_.max_vertices)) {
       return absl::OkStatus();
     }
-    return absl::InvalidArgumentError(absl::StrCat(
-        NameOf(source_.document.json, "nodes", source.node), ": with it the scene has ", triangles_, " triangles and ",
-        vertices_, " vertices, at most ", limits_.max_triangles, " and ", limits_.max_vertices, " are read"));
+    return absl::InvalidArgumentError(absl::StrCat(NameOf(source_.document.json, "nodes", node),
+                                                   ": with it the scene has ", triangles_, " triangles and ", vertices_,
+                                                   " vertices in ", count, " instances, at most ",
+                                                   limits_.max_triangles, " and ", limits_.max_vertices, " are read"));
   }
 
   absl::StatusOr<const PrimitiveData*> DataOf(int mesh, int primitive) {
@@ -136,6 +145,7 @@ class LevelLoader {
     MeanPoint mean;
     for (const WorldObject& object : objects_) AddTo(mean, object);
     Scene& scene = level_.scene;
+    if (objects_.empty()) warnings_.Add("the scene has no triangles");
     scene.origin_ws = mean.Value();
     for (WorldObject& object : objects_) {
       FinishObject(object, scene.origin_ws);
@@ -175,17 +185,10 @@ class LevelLoader {
   MaterialReader materials_;
   std::map<std::pair<int, int>, PrimitiveData> data_;  // by mesh and primitive
   std::vector<WorldObject> objects_;
-  uint64_t triangles_ = 0, vertices_ = 0;
+  double triangles_ = 0, vertices_ = 0;  // counts, in a type that does not overflow
 };
 
 }  // namespace
-
-absl::StatusOr<Source> ReadSource(const std::filesystem::path& path) {
-  Source source;
-  BAKEWELL_ASSIGN_OR_RETURN(source.document, ReadDocument(path));
-  BAKEWELL_ASSIGN_OR_RETURN(source.model, ToModel(source.document));
-  return source;
-}
 
 absl::StatusOr<LoadedLevel> Load(const std::filesystem::path& path, const LoadLimits& limits) {
   try {

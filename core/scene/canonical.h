@@ -11,8 +11,8 @@
 namespace bakewell {
 
 // Sorts objects and lights by the digest of their content, and numbers materials and textures by first use (unused ones
-// are dropped), so that the order of a file's nodes and meshes changes nothing that is baked. Names and sources do not
-// count as content; equal objects keep their relative order.
+// are dropped, equal ones become one), so that the order of a file's nodes and meshes changes nothing that is baked.
+// Names and sources do not count as content; equal objects keep their relative order.
 void Canonicalize(Scene& scene);
 
 // The scene's bytes, format "BWSC" version 1 (schema/scene.md). Names and sources are part of it, behind the content.

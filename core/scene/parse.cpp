@@ -13,7 +13,7 @@ namespace {
 constexpr std::string_view kMagic = "BWSC";
 constexpr uint32_t kVersion = 1;
 // The least bytes that one of each takes, from schema/scene.md: what bounds a hostile count.
-constexpr size_t kTextureBytes = 19, kMaterialBytes = 98, kLightBytes = 61, kObjectBytes = 49;
+constexpr size_t kTextureBytes = 19, kMaterialBytes = 90, kLightBytes = 61, kObjectBytes = 49;
 
 bool AllFinite(std::span<const float> values) {
   return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });

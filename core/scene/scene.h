@@ -23,8 +23,9 @@ struct Texture {
 };
 
 // Which texture, which UV set, and KHR_texture_transform: uv' = offset + R(rotation) (scale * uv), where
-// R(a) (u, v) = (u cos a + v sin a, -u sin a + v cos a): counter-clockwise on screen, as v points down. (The matrix in the
-// extension's text turns the other way: KhronosGroup/glTF issue 1563; this is what its sample viewer and three.js do.)
+// R(a) (u, v) = (u cos a + v sin a, -u sin a + v cos a): counter-clockwise on screen, as v points down. (The matrix in
+// the extension's text turns the other way: KhronosGroup/glTF issue 1563; this is what Babylon.js and three.js
+// do.)
 struct TextureRef {
   int texture = -1;  // -1: none
   int texcoord = 0;  // 0 or 1

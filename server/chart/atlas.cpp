@@ -36,7 +36,7 @@ struct Prepared {
 Prepared Prepare(const MeshCharts& mesh, uint32_t c, bool to_axis) {
   const FlatChart& chart = mesh.charts[c];
   Prepared prepared;
-  for (const auto& [a, b] : BoundaryEdges(mesh.surface, chart))
+  for (const auto& [a, b, unused] : BoundaryEdges(mesh.surface, chart))
     prepared.item.outline.push_back({chart.uv[a], chart.uv[b]});
   Upright& upright = prepared.upright;
   upright.units = 1 / mesh.surface.scale;
@@ -73,10 +73,11 @@ class MeshWriter {
     const uint32_t base = static_cast<uint32_t>(mesh_.vertexArray.size());
     for (const Use& use : uses) {
       const Vec2d p = ToPage(placement, upright(flat.uv[use.local]));
-      mesh_.vertexArray.push_back({placement.page, static_cast<int32_t>(c),
-                                   {static_cast<float>(std::clamp(p.x, 0.0, page.x)),
-                                    static_cast<float>(std::clamp(p.y, 0.0, page.y))},
-                                   use.source});
+      mesh_.vertexArray.push_back(
+          {placement.page,
+           static_cast<int32_t>(c),
+           {static_cast<float>(std::clamp(p.x, 0.0, page.x)), static_cast<float>(std::clamp(p.y, 0.0, page.y))},
+           use.source});
     }
     for (size_t i = 0; i < flat.face.size(); ++i) {
       const uint32_t triangle = charts_.surface.source[flat.face[i]];

@@ -24,10 +24,10 @@ struct MeshDecl {
 
 // An output vertex. Vertices are split where charts meet.
 struct Vertex {
-  int32_t atlasIndex = -1;    // the page; -1: the vertex is in no chart
-  int32_t chartIndex = -1;    // into Mesh::chartArray; -1: the vertex is in no chart
-  float uv[2] = {0, 0};       // texels, not divided by the page's size; v down
-  uint32_t xref = 0;          // the input vertex
+  int32_t atlasIndex = -1;  // the page; -1: the vertex is in no chart
+  int32_t chartIndex = -1;  // into Mesh::chartArray; -1: the vertex is in no chart
+  float uv[2] = {0, 0};     // texels, not divided by the page's size; v down
+  uint32_t xref = 0;        // the input vertex
 };
 
 // A connected set of faces laid into the plane.
@@ -39,17 +39,17 @@ struct Chart {
 // An output mesh: input triangle k is indexArray[3 k .. 3 k + 2].
 struct Mesh {
   std::vector<Chart> chartArray;
-  std::vector<uint32_t> indexArray;   // 3 T
+  std::vector<uint32_t> indexArray;  // 3 T
   std::vector<Vertex> vertexArray;
-  std::vector<FaceState> faceState;   // T, ours: why a triangle has no chart
+  std::vector<FaceState> faceState;  // T, ours: why a triangle has no chart
 };
 
 struct Atlas {
-  std::vector<Mesh> meshes;         // one per MeshDecl
-  std::vector<float> utilization;   // one per page: touched texels (blocks, where aligned) / all
-  uint32_t width = 0, height = 0;   // of every page, texels
-  uint32_t atlasCount = 0;          // pages
-  uint32_t chartCount = 0;          // all meshes
+  std::vector<Mesh> meshes;        // one per MeshDecl
+  std::vector<float> utilization;  // one per page: touched texels (blocks, where aligned) / all
+  uint32_t width = 0, height = 0;  // of every page, texels
+  uint32_t atlasCount = 0;         // pages
+  uint32_t chartCount = 0;         // all meshes
   float texelsPerUnit = 0;
 };
 

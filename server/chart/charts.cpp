@@ -2,16 +2,22 @@
 
 #include "server/chart/atlas.h"
 #include "server/chart/flatten/flatten.h"
+#include "server/chart/pack/orient.h"
+#include "server/chart/segment/relax.h"
 #include "server/chart/segment/segment.h"
 
 namespace bakewell::chart {
 namespace {
 
+constexpr uint32_t kMaxComparedFaces = 150000;
+constexpr double kLeastFillGain = 0.02, kMaxMoreCharts = 1.25;
+
 absl::Status CheckIndices(std::span<const MeshDecl> meshes) {
   for (size_t m = 0; m < meshes.size(); ++m) {
     const MeshDecl& mesh = meshes[m];
     const std::string name = "mesh " + std::to_string(m);
-    if (mesh.indexData.size() % 3 != 0) return absl::InvalidArgumentError(name + ": index count is not a multiple of 3");
+    if (mesh.indexData.size() % 3 != 0)
+      return absl::InvalidArgumentError(name + ": index count is not a multiple of 3");
     if (!mesh.vertexUvData.empty() && mesh.vertexUvData.size() != mesh.vertexPositionData.size())
       return absl::InvalidArgumentError(name + ": as many UVs as positions are needed");
     if (!(mesh.density > 0)) return absl::InvalidArgumentError(name + ": density must be above 0");
@@ -33,15 +39,48 @@ std::vector<std::vector<uint32_t>> FacesOf(const std::vector<uint32_t>& label) {
   return faces;
 }
 
+std::vector<FlatChart> FlattenAll(const Surface& surface, const std::vector<uint32_t>& label,
+                                  const ChartOptions& options) {
+  const auto segments = FacesOf(label);
+  std::vector<std::vector<FlatChart>> flat(segments.size());
+  tbb::parallel_for(size_t{0}, segments.size(), [&](size_t i) { flat[i] = Flatten(surface, segments[i], options); });
+  std::vector<FlatChart> charts;
+  for (auto& part : flat)
+    for (FlatChart& chart : part) charts.push_back(std::move(chart));
+  return charts;
+}
+
+// Share of the charts' least bounding rectangles that they fill: what a packer can make of them.
+double RectangleFill(const Surface& surface, std::span<const FlatChart> charts) {
+  double area = 0, rectangles = 0;
+  for (const FlatChart& chart : charts) {
+    std::vector<Segment2> outline;
+    for (const BoundaryEdge& edge : BoundaryEdges(surface, chart))
+      outline.push_back({chart.uv[edge.a], chart.uv[edge.b]});
+    for (const uint32_t f : chart.face) area += surface.area[f];
+    const Vec2d size = SizeAlong(outline, LeastRectangleAxis(outline));
+    rectangles += size.x * size.y;
+  }
+  return rectangles > 0 ? area / rectangles : 1;
+}
+
+// Relaxed charts are rounder, but where a surface has features their borders leave those: both are laid out and the
+// better fill wins, if it does not cost charts. Above kMaxComparedFaces only the relaxed ones.
 MeshCharts ChartMesh(const MeshDecl& mesh, const ChartOptions& options) {
   MeshCharts result;
   result.surface = BuildSurface(mesh.vertexPositionData, mesh.indexData);
-  const auto segments = FacesOf(Segment(result.surface, options));
-  std::vector<std::vector<FlatChart>> flat(segments.size());
-  tbb::parallel_for(size_t{0}, segments.size(),
-                    [&](size_t i) { flat[i] = Flatten(result.surface, segments[i], options); });
-  for (auto& charts : flat)
-    for (FlatChart& chart : charts) result.charts.push_back(std::move(chart));
+  const Surface& surface = result.surface;
+  const std::vector<uint32_t> grown = Segment(surface, options);
+  std::vector<uint32_t> relaxed = grown;
+  for (uint32_t i = 0; i < options.maxIterations; ++i) relaxed = RelaxOnce(surface, relaxed);
+  result.charts = FlattenAll(surface, relaxed, options);
+  if (relaxed != grown && surface.FaceCount() <= kMaxComparedFaces) {
+    std::vector<FlatChart> plain = FlattenAll(surface, grown, options);
+    const double gain = RectangleFill(surface, result.charts) - RectangleFill(surface, plain);
+    const bool keep =
+        gain > kLeastFillGain && double(result.charts.size()) <= kMaxMoreCharts * double(plain.size()) + 1;
+    if (!keep) result.charts = std::move(plain);
+  }
   result.density.assign(result.charts.size(), mesh.density);
   return result;
 }

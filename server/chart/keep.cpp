@@ -21,8 +21,8 @@ absl::StatusOr<std::vector<TexelUv>> PageUvs(const Object& object, PageSize page
   uv.reserve(object.uv1.size());
   for (size_t v = 0; v < object.uv1.size(); ++v) {
     const float x = object.uv1[v].x * width, y = object.uv1[v].y * height;
-    const bool inside = x >= -kOutsideTexels && y >= -kOutsideTexels && x <= width + kOutsideTexels &&
-                        y <= height + kOutsideTexels;
+    const bool inside =
+        x >= -kOutsideTexels && y >= -kOutsideTexels && x <= width + kOutsideTexels && y <= height + kOutsideTexels;
     if (!inside)  // also catches what is not finite
       return absl::InvalidArgumentError("object '" + object.name + "': TEXCOORD_1 of vertex " + std::to_string(v) +
                                         " is not inside the page; bake with --uv generate");
@@ -32,7 +32,7 @@ absl::StatusOr<std::vector<TexelUv>> PageUvs(const Object& object, PageSize page
 }
 
 struct UvEdge {
-  std::array<float, 4> key;  // the UVs of both ends, the lesser end first
+  std::array<float, 4> key;   // the UVs of both ends, the lesser end first
   std::array<float, 6> ends;  // the positions of both ends, in the same order
   uint32_t triangle;
 };
@@ -103,7 +103,8 @@ void AddAreas(const Object& object, const ObjectCharts& charts, Areas& areas) {
     const Vec3d p = ToDouble(object.position[a]);
     areas.space += Length(Cross(ToDouble(object.position[b]) - p, ToDouble(object.position[c]) - p)) / 2;
     const TexelUv u = charts.uv[a], v = charts.uv[b], w = charts.uv[c];
-    areas.page += std::abs(Cross(Vec2d{double(v.x) - u.x, double(v.y) - u.y}, Vec2d{double(w.x) - u.x, double(w.y) - u.y})) / 2;
+    areas.page +=
+        std::abs(Cross(Vec2d{double(v.x) - u.x, double(v.y) - u.y}, Vec2d{double(w.x) - u.x, double(w.y) - u.y})) / 2;
   }
 }
 

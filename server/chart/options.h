@@ -6,18 +6,18 @@ namespace bakewell::chart {
 
 // How surfaces are cut into charts. The names, and what 0 means, are xatlas'; lengths and areas are in input units.
 struct ChartOptions {
-  float maxChartArea = 0;              // a chart grows no further than this area; 0: no limit
-  float maxBoundaryLength = 0;         // ... nor than this outline; 0: no limit
-  float normalDeviationWeight = 2;     // cost of normals that turn away from the chart's mean
-  float roundnessWeight = 0.01f;       // cost of an outline longer than a circle's
-  float straightnessWeight = 6;        // cost of a ragged border between two charts
-  float normalSeamWeight = 4;          // cost of growing over a sharp edge; above 1000 sharp edges always are seams
-  float textureSeamWeight = 0.5f;      // cost of growing over a seam of the input UVs
-  float maxCost = 2;                   // charts stop growing where the weighted sum exceeds this
-  uint32_t maxIterations = 1;          // passes that straighten borders after growing
-  bool useInputMeshUvs = false;        // keep the input's UV charts (rescaled to one density), generate where invalid
-  bool fixWinding = false;             // turn faces so that neighbours agree before charting
-  float maxStretch = 1.25f;            // ours: bound of a chart's Sander L2 stretch; a chart above it is split
+  float maxChartArea = 0;           // a chart grows no further than this area; 0: no limit
+  float maxBoundaryLength = 0;      // ... nor than this outline; 0: no limit
+  float normalDeviationWeight = 2;  // cost of normals that turn away from the chart's mean
+  float roundnessWeight = 0.01f;    // cost of an outline longer than a circle's
+  float straightnessWeight = 6;     // cost of a ragged border between two charts
+  float normalSeamWeight = 4;       // cost of growing over a sharp edge; above 1000 sharp edges always are seams
+  float textureSeamWeight = 0.5f;   // cost of growing over a seam of the input UVs
+  float maxCost = 2;                // charts stop growing where the weighted sum exceeds this
+  uint32_t maxIterations = 2;       // passes that round charts and straighten their borders after growing
+  bool useInputMeshUvs = false;     // keep the input's UV charts (rescaled to one density), generate where invalid
+  bool fixWinding = false;          // turn faces so that neighbours agree before charting
+  float maxStretch = 1.004f;        // ours: bound of a chart's Sander L2 stretch; a chart above it is split
 };
 
 // How charts are laid out on pages. The names, and what 0 means, are xatlas'.

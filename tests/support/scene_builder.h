@@ -15,8 +15,8 @@ struct PageRect {
 struct Surface {
   int material = 0;
   bool lightmapped = true;
-  PageRect page;
-  std::string name;
+  PageRect page{};
+  std::string name{};
 };
 
 // Builds a Scene for a test from shapes given in world metres, without a file. Each call of an Add function for a shape

@@ -2,7 +2,9 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
+#include <string_view>
 
 #include "core/base/check.h"
 
@@ -29,5 +31,15 @@ class TempFolder {
  private:
   std::filesystem::path path_;
 };
+
+// Writes a file without syncing it, for tests that write thousands. ext4 syncs a file that is truncated and written
+// again, so an old one is removed first.
+inline void WriteQuickly(const std::filesystem::path& path, std::string_view bytes) {
+  std::filesystem::remove(path);
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  BAKEWELL_CHECK(file.good());
+}
 
 }  // namespace bakewell

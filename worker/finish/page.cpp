@@ -15,7 +15,8 @@ std::vector<std::string> ShChannels() {
 // `accept` allows. Values of unknown texels are overwritten, those of known ones kept.
 class Filler {
  public:
-  Filler(std::vector<Image*> images, int width, int height) : images_(std::move(images)), width_(width), height_(height) {
+  Filler(std::vector<Image*> images, int width, int height)
+      : images_(std::move(images)), width_(width), height_(height) {
     known_.assign(static_cast<size_t>(width) * static_cast<size_t>(height), 0);
   }
 
@@ -38,7 +39,9 @@ class Filler {
   }
 
  private:
-  size_t At(int x, int y) const { return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x); }
+  size_t At(int x, int y) const {
+    return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
+  }
 
   template <typename Accept>
   bool FillOne(int x, int y, Accept accept) {
@@ -83,7 +86,9 @@ PageImages FinishPage(const TexelMap& map, std::span<const TexelLight> lights, i
                     Image(size.width, size.height, {"R", "G", "B", "A"})};
   Filler filler({&images.irradiance, &images.sh, &images.variance}, size.width, size.height);
   const std::vector<int32_t>& texel_at = map.texel_at[page];
-  const auto index = [&](int x, int y) { return texel_at[static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x)]; };
+  const auto index = [&](int x, int y) {
+    return texel_at[static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x)];
+  };
   for (size_t i = 0; i < map.texels.size(); ++i) {
     if (map.texels[i].page != page) continue;
     PutTexel(map.texels[i], lights[i], images);
@@ -94,7 +99,8 @@ PageImages FinishPage(const TexelMap& map, std::span<const TexelLight> lights, i
     return index(nx, ny) >= 0 && map.texels[index(x, y)].chart == map.texels[index(nx, ny)].chart;
   };
   filler.Grow(std::max(size.width, size.height), covered, same_chart);
-  filler.Grow(kGutterTexels, [&](int x, int y) { return !covered(x, y); }, [](int, int, int, int) { return true; });
+  filler.Grow(
+      kGutterTexels, [&](int x, int y) { return !covered(x, y); }, [](int, int, int, int) { return true; });
   return images;
 }
 

@@ -43,7 +43,8 @@ TileLights::Choice TileLights::ForTexel(const Texel& texel, float radius) const 
   const int count = scene_.lights.local_count();
   std::vector<float> weights;
   for (int light = 0; light < count; ++light) {
-    const float importance = scene_.lights.Importance(light, texel.position, texel.flat ? texel.normal : Vec3f{}, radius);
+    const float importance =
+        scene_.lights.Importance(light, texel.position, texel.flat ? texel.normal : Vec3f{}, radius);
     if (!(importance > 0)) continue;
     choice.light.push_back(light);
     weights.push_back(importance * visibility_[light]);
@@ -103,21 +104,26 @@ void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const T
   const bool sky_sampled = sky.bright() && !sky.smooth();
   DirectAdder adder(scene, sum, counters);
   for (uint32_t i = begin; i < end; ++i) {
-    const TexelPoint point = sampler.At(set.Get2(i, 0));
+    const SobolPoint u = set.At(i);
+    const TexelPoint point = sampler.At(u.Get2(0));
     if (!point.valid) continue;
     sum.Count();
     const uint32_t ray_key = HashCombine(key, i);
     if (!choice.empty()) {
-      const auto drawn = choice.distribution.Draw(set.Get(i, 2));
+      const auto drawn = choice.distribution.Draw(u.Get(2));
       const int light = choice.light[drawn.index];
-      adder.Add(point, scene.lights.SampleLocal(light, point.surface.position, set.Get2(i, 3)), drawn.probability, ray_key);
+      adder.Add(point, scene.lights.SampleLocal(light, point.surface.position, u.Get2(3)), drawn.probability, ray_key);
     }
+    const SobolPoint far = far_set.At(i);
     for (size_t k = 0; k < scene.lights.directionals().size(); ++k) {
-      const Vec2f shift{UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k))), UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k + 1)))};
-      const Vec2f u = far_set.Get2(i, 0) + (k == 0 ? Vec2f{} : shift);
-      adder.Add(point, scene.lights.SampleDirectional(static_cast<int>(k), {u.x - std::floor(u.x), u.y - std::floor(u.y)}), 1, ray_key);
+      const Vec2f shift{UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k))),
+                        UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k + 1)))};
+      const Vec2f v = far.Get2(0) + (k == 0 ? Vec2f{} : shift);
+      adder.Add(point,
+                scene.lights.SampleDirectional(static_cast<int>(k), {v.x - std::floor(v.x), v.y - std::floor(v.y)}), 1,
+                ray_key);
     }
-    if (sky_sampled) adder.Add(point, scene.lights.SampleEnvironment(far_set.Get2(i, 2)), 1, ray_key);
+    if (sky_sampled) adder.Add(point, scene.lights.SampleEnvironment(far.Get2(2)), 1, ray_key);
     adder.Finish(i, end);
   }
 }

@@ -33,8 +33,8 @@ Rgb FoundLight(const GatherScene& scene, const SurfacePoint& from, Vec3f dir, co
   return emission * BalanceWeight(pdf, light_pdf);
 }
 
-Rgb Arriving(const GatherScene& scene, const SurfacePoint& point, const LightSample& sample, float probability, uint32_t key,
-             GatherCounters& counters) {
+Rgb Arriving(const GatherScene& scene, const SurfacePoint& point, const LightSample& sample, float probability,
+             uint32_t key, GatherCounters& counters) {
   const float cosine = Dot(sample.dir, point.normal);
   if (cosine <= 0 || MaxComponent(sample.perpendicular) <= 0 || probability <= 0) return {};
   ++counters.shadow_rays;
@@ -55,7 +55,8 @@ Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t k
   }
   for (size_t i = 0; i < scene.lights.directionals().size(); ++i) {
     const uint32_t k = static_cast<uint32_t>(2 * i);
-    const LightSample sample = scene.lights.SampleDirectional(static_cast<int>(i), {Random(key, 16 + k), Random(key, 17 + k)});
+    const LightSample sample =
+        scene.lights.SampleDirectional(static_cast<int>(i), {Random(key, 16 + k), Random(key, 17 + k)});
     irradiance += Arriving(scene, point, sample, 1, key, counters);
   }
   const EnvironmentLight& sky = scene.lights.environment();

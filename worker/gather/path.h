@@ -20,18 +20,18 @@ struct GatherCounters {
 
 // Light that one gather ray brings back.
 struct GatheredRadiance {
-  Rgb radiance;         // reflected at the hit (emission is the caller's)
+  Rgb radiance;                                // reflected at the hit (emission is the caller's)
   std::array<float, kVarianceGroups> group{};  // luminance of the part that photons contributed, by photon group
 };
 
 // Radiance reflected towards a gather ray's origin at `hit`, `distance` away: direct light sampled at the hit plus the
-// cache's indirect light; where the hit is nearer than a few bandwidths, or the cell is cut by other geometry, one further
-// bounce instead (theory.md 3, step 2). `key` decides all random numbers.
+// cache's indirect light; where the hit is nearer than a few bandwidths, or the cell is cut by other geometry, one
+// further bounce instead (theory.md 3, step 2). `key` decides all random numbers.
 GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& hit, uint32_t key, GatherCounters& counters);
 
 // Direct irradiance at a surface point by light sampling: one local light chosen by flux, every directional light, the
-// sky where it is not smooth. With multiple importance sampling (balance heuristic) against a cosine lobe for lights that
-// a bounce can hit.
+// sky where it is not smooth. With multiple importance sampling (balance heuristic) against a cosine lobe for lights
+// that a bounce can hit.
 Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters);
 
 }  // namespace bakewell

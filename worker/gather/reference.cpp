@@ -28,12 +28,14 @@ class PathNumbers {
   }
   void Restart(uint32_t index) { index_ = index; }
   float Get(int bounce, int dimension) const {
-    if (bounce < kSobolBounces) return sets_[bounce].Get(index_, dimension);
+    if (bounce < kSobolBounces) return sets_[bounce].At(index_).Get(dimension);
     const uint32_t what = static_cast<uint32_t>(16 * bounce + dimension);
     return UnitFloat(HashCombine(HashCombine(key_, index_), what));
   }
   Vec2f Get2(int bounce, int dimension) const { return {Get(bounce, dimension), Get(bounce, dimension + 1)}; }
-  uint32_t RayKey(int bounce) const { return HashCombine(HashCombine(key_, 0xa1fau + static_cast<uint32_t>(bounce)), index_); }
+  uint32_t RayKey(int bounce) const {
+    return HashCombine(HashCombine(key_, 0xa1fau + static_cast<uint32_t>(bounce)), index_);
+  }
 
  private:
   uint32_t key_, index_;
@@ -55,7 +57,8 @@ class PathTracer {
       irradiance += throughput * Found(point, dir, hit) * kPiF;
       if (!hit) return irradiance;
       throughput = throughput * world_.AlbedoAt(hit);
-      const float survive = bounce < 3 ? std::min(1.0f, 2 * MaxComponent(throughput)) : std::min(0.98f, MaxComponent(throughput));
+      const float survive =
+          bounce < 3 ? std::min(1.0f, 2 * MaxComponent(throughput)) : std::min(0.98f, MaxComponent(throughput));
       if (survive <= 0 || numbers.Get(bounce, 7) >= survive) return irradiance;
       throughput = throughput / survive;
       point = world_.PointAt(hit);
@@ -69,15 +72,19 @@ class PathTracer {
     Rgb irradiance;
     if (!selector_.empty()) {
       const auto choice = selector_.Pick(numbers.Get(bounce, 4));
-      irradiance += Arriving(point, lights_.SampleLocal(choice.light, point.position, numbers.Get2(bounce, 5)), choice.probability, numbers.RayKey(bounce));
+      irradiance += Arriving(point, lights_.SampleLocal(choice.light, point.position, numbers.Get2(bounce, 5)),
+                             choice.probability, numbers.RayKey(bounce));
     }
     for (size_t i = 0; i < lights_.directionals().size(); ++i) {
       const uint32_t key = HashCombine(numbers.RayKey(bounce), static_cast<uint32_t>(i));
-      irradiance += Arriving(point, lights_.SampleDirectional(static_cast<int>(i), {UnitFloat(Hash(key)), UnitFloat(Hash(key + 1))}), 1, key);
+      irradiance += Arriving(
+          point, lights_.SampleDirectional(static_cast<int>(i), {UnitFloat(Hash(key)), UnitFloat(Hash(key + 1))}), 1,
+          key);
     }
     if (lights_.environment().bright() && !lights_.environment().smooth()) {
       const uint32_t key = HashCombine(numbers.RayKey(bounce), 0x5e4u);
-      irradiance += Arriving(point, lights_.SampleEnvironment({UnitFloat(Hash(key)), UnitFloat(Hash(key + 1))}), 1, key);
+      irradiance +=
+          Arriving(point, lights_.SampleEnvironment({UnitFloat(Hash(key)), UnitFloat(Hash(key + 1))}), 1, key);
     }
     return irradiance;
   }
@@ -144,7 +151,8 @@ ReferenceTexel TraceTexel(PathTracer& tracer, const TexelSampler& sampler, uint3
 }  // namespace
 
 std::vector<ReferenceTexel> TraceReference(const World& world, const LightSet& lights, const AtlasLayout& layout,
-                                           const TexelMap& map, int samples, uint32_t seed, Progress& progress, int64_t& rays) {
+                                           const TexelMap& map, int samples, uint32_t seed, Progress& progress,
+                                           int64_t& rays) {
   std::vector<ReferenceTexel> result(map.texels.size());
   std::atomic<int64_t> total_rays{0}, done{0};
   tbb::parallel_for(0, map.tile_count(), [&](int tile) {

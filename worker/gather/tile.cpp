@@ -14,7 +14,8 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
-Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Vec3f from, Vec3f dir, float pdf, const Hit& hit) {
+Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Vec3f from, Vec3f dir, float pdf,
+                  const Hit& hit) {
   if (!hit) {
     const EnvironmentLight& sky = scene.lights.environment();
     if (!sky.bright()) return {};
@@ -44,8 +45,8 @@ struct Work {
 
 class TileGatherer {
  public:
-  TileGatherer(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, const GatherOptions& options,
-               GatherCounters& counters)
+  TileGatherer(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end,
+               const GatherOptions& options, GatherCounters& counters)
       : scene_(scene), map_(map), begin_(begin), end_(end), options_(options), counters_(counters) {}
 
   std::vector<TexelLight> Run(const AtlasLayout& layout) {
@@ -106,10 +107,11 @@ class TileGatherer {
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
     const SobolSet set(HashCombine(work.key, 0x6a7e2u));
     for (uint32_t i = begin; i < end; ++i) {
-      const TexelPoint point = work.sampler.At(set.Get2(i, 2));
+      const SobolPoint u = set.At(i);
+      const TexelPoint point = work.sampler.At(u.Get2(2));
       if (!point.valid) continue;
       work.indirect.Count();
-      const Vec3f local = GatherHemisphere(set.Get2(i, 0));
+      const Vec3f local = GatherHemisphere(u.Get2(0));
       const Vec3f dir = point.frame.ToWorld(local);
       const float pdf = GatherPdf(local.z);
       const uint32_t ray_key = HashCombine(work.key, 0x80000000u | i);
@@ -159,8 +161,10 @@ class TileGatherer {
       const float irradiance = Luminance(work.direct.Irradiance() + work.indirect.Irradiance());
       const float scale = options_.target_error * std::max(irradiance, options_.floor_share * options_.mean_irradiance);
       const float budget = 0.5f * scale * scale;
-      active[i] = {work.direct_active && PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
-                   work.indirect_active && PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.indirect; }) > budget};
+      active[i] = {work.direct_active &&
+                       PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
+                   work.indirect_active &&
+                       PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.indirect; }) > budget};
     }
     for (size_t i = 0; i < work_.size(); ++i) {
       work_[i].direct_active = active[i][0];

@@ -11,9 +11,10 @@ namespace bakewell {
 
 // When a texel has had enough.
 struct GatherOptions {
-  int min_samples = 16;     // powers of two, at least 8
+  int min_samples = 16;  // powers of two, at least 8
   int max_samples = 1024;
-  float target_error = 0;   // standard error over the larger of the texel's irradiance and floor_share of the mean; 0: never
+  float target_error =
+      0;  // standard error over the larger of the texel's irradiance and floor_share of the mean; 0: never
   float floor_share = 0.5f;
   float mean_irradiance = 0;  // luminance, of the whole bake, as the photons saw it [W m^-2]
   uint32_t seed = 0;
@@ -21,16 +22,16 @@ struct GatherOptions {
 
 // One texel's result. Vectors in the world frame.
 struct TexelLight {
-  Rgb irradiance;          // at the geometric normal [W m^-2]
-  RadianceSh sh;           // incident radiance over the hemisphere around the geometric normal
-  Rgb variance;            // of irradiance, sampling and photons together
+  Rgb irradiance;  // at the geometric normal [W m^-2]
+  RadianceSh sh;   // incident radiance over the hemisphere around the geometric normal
+  Rgb variance;    // of irradiance, sampling and photons together
   float backface_share = 0;
-  bool valid = true;       // false: inside other geometry; light is zero and no evidence for anybody
+  bool valid = true;  // false: inside other geometry; light is zero and no evidence for anybody
   int direct_samples = 0, indirect_samples = 0;
 };
 
-// Bakes the texels of one tile: a pure function of the scene, the cache, the options and the tile's number. Element i is
-// texel tile_begin[tile] + i.
+// Bakes the texels of one tile: a pure function of the scene, the cache, the options and the tile's number. Element i
+// is texel tile_begin[tile] + i.
 std::vector<TexelLight> GatherTile(const GatherScene& scene, const AtlasLayout& layout, const TexelMap& map, int tile,
                                    const GatherOptions& options, GatherCounters& counters);
 

@@ -65,14 +65,16 @@ Rgb EnvironmentLight::Radiance(Vec3f dir) const {
   }
   int x = 0, y = 0;
   CellOf(dir, x, y);
-  return environment_.latlong[static_cast<size_t>(y) * static_cast<size_t>(environment_.width) + static_cast<size_t>(x)];
+  return environment_
+      .latlong[static_cast<size_t>(y) * static_cast<size_t>(environment_.width) + static_cast<size_t>(x)];
 }
 
 EnvironmentLight::Sample EnvironmentLight::Draw(Vec2f u) const {
   const auto cell = table_.Draw(u);
   // Uniform in solid angle within the cell: rows are cut by cosine, not by angle.
   const float step = kPiF / static_cast<float>(height());
-  const float top = std::cos(static_cast<float>(cell.y) * step), bottom = std::cos(static_cast<float>(cell.y + 1) * step);
+  const float top = std::cos(static_cast<float>(cell.y) * step),
+              bottom = std::cos(static_cast<float>(cell.y + 1) * step);
   const float within = cell.position.y * static_cast<float>(height()) - static_cast<float>(cell.y);
   const float y = top + (bottom - top) * within;
   const float s = std::sqrt(std::max(0.0f, 1 - y * y)), phi = cell.position.x * 2 * kPiF;

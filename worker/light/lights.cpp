@@ -18,7 +18,8 @@ Rgb MeanRadiance(const World& world, uint32_t triangle) {
   }
   Rgb sum;
   for (int i = 0; i < 64; ++i) {
-    const Vec2f b = TriangleFromSquare({(static_cast<float>(i % 8) + 0.5f) / 8, (static_cast<float>(i / 8) + 0.5f) / 8});
+    const Vec2f b =
+        TriangleFromSquare({(static_cast<float>(i % 8) + 0.5f) / 8, (static_cast<float>(i / 8) + 0.5f) / 8});
     sum += world.FrontEmissionAt(triangle, b.x, b.y);
   }
   return sum * (1.0f / 64);
@@ -188,7 +189,8 @@ float LightSet::Importance(int light, Vec3f position, Vec3f normal, float radius
   const float distance2 = Dot(to_light, to_light) + radius * radius;
   const float distance = std::sqrt(distance2);
   if (!(distance > 0)) return 0;
-  const float falloff = WidenedFalloff(punctual, -Dot(to_light, punctual.direction) / distance, std::min(1.0f, radius / distance));
+  const float falloff =
+      WidenedFalloff(punctual, -Dot(to_light, punctual.direction) / distance, std::min(1.0f, radius / distance));
   return Luminance(punctual.intensity) * falloff * SurfaceCosine(Dot(to_light, normal) + radius, distance, normal) /
          distance2;
 }
@@ -199,10 +201,9 @@ float LightSet::Power(int light) const {
     return Luminance(e.mean_radiance) * e.area * kPiF * (e.two_sided ? 2.0f : 1.0f);
   }
   const PunctualLight& punctual = locals_[light];
-  const float solid_angle =
-      punctual.type == LightType::kPoint
-          ? 4 * kPiF
-          : 2 * kPiF * (1 - punctual.cos_inner + (punctual.cos_inner - punctual.cos_outer) / 3);
+  const float solid_angle = punctual.type == LightType::kPoint
+                                ? 4 * kPiF
+                                : 2 * kPiF * (1 - punctual.cos_inner + (punctual.cos_inner - punctual.cos_outer) / 3);
   return Luminance(punctual.intensity) * solid_angle;
 }
 

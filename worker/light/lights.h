@@ -17,11 +17,11 @@ struct EmissiveTriangle {
 
 // Light that arrives at a point from one sampled point of one light, before visibility.
 struct LightSample {
-  Vec3f dir;                 // unit, towards the light
-  Vec3f target;              // where the shadow ray ends (finite lights)
-  bool infinite = false;     // the shadow ray has no end
-  Rgb perpendicular;         // irradiance on a plane facing the light, divided by the pdf of the point [W m^-2]
-  float pdf = 0;             // per steradian, given the light; 0 for a delta light
+  Vec3f dir;              // unit, towards the light
+  Vec3f target;           // where the shadow ray ends (finite lights)
+  bool infinite = false;  // the shadow ray has no end
+  Rgb perpendicular;      // irradiance on a plane facing the light, divided by the pdf of the point [W m^-2]
+  float pdf = 0;          // per steradian, given the light; 0 for a delta light
 };
 
 // Every light of a scene. Local lights are numbered: punctual ones that are not directional, then emissive triangles.
@@ -49,9 +49,9 @@ class LightSet {
   LightSample SampleDirectional(int directional, Vec2f u) const;
   LightSample SampleEnvironment(Vec2f u) const;
 
-  // About the unoccluded irradiance (luminance) that a local light brings to the points within `radius` of `position` on
-  // a plane with unit `normal` (zero: any orientation), to choose among lights. Exactly 0 only where the light reaches
-  // no such point.
+  // About the unoccluded irradiance (luminance) that a local light brings to the points within `radius` of `position`
+  // on a plane with unit `normal` (zero: any orientation), to choose among lights. Exactly 0 only where the light
+  // reaches no such point.
   float Importance(int light, Vec3f position, Vec3f normal, float radius) const;
   // Radiated flux (luminance) [W].
   float Power(int light) const;

@@ -19,8 +19,8 @@ struct RadianceCache {
   std::vector<CellIrradiance> irradiance;
   // Per group: luminance of irradiance (direct + indirect) as that eighth of the photons sees it, for the variance.
   std::vector<std::array<float, kVarianceGroups>> group;
-  // Side of the neighbourhood that was averaged, in cells (1, 3, 5, ...); 0: the cell is cut by other geometry, part of it
-  // may lie behind a wall, and its value is no evidence.
+  // Side of the neighbourhood that was averaged, in cells (1, 3, 5, ...); 0: the cell is cut by other geometry, part of
+  // it may lie behind a wall, and its value is no evidence.
   std::vector<uint8_t> window;
   float cell_size_m = 1;
   int64_t photons_seen = 0;
@@ -32,9 +32,10 @@ struct DensityOptions {
   int max_radius = 3;     // cells
 };
 
-// E ~ sum of flux / sum of exact area over the smallest square neighbourhood that holds target_count photons and that can
-// be reached from the cell without passing through geometry (short rays between cell centres), inside the cell's patch.
-RadianceCache EstimateDensity(const World& world, const SurfaceCells& cells, const PhotonMap& map, const PhotonPlan& plan,
-                              const DensityOptions& options, Progress& progress);
+// E ~ sum of flux / sum of exact area over the smallest square neighbourhood that holds target_count photons and that
+// can be reached from the cell without passing through geometry (short rays between cell centres), inside the cell's
+// patch.
+RadianceCache EstimateDensity(const World& world, const SurfaceCells& cells, const PhotonMap& map,
+                              const PhotonPlan& plan, const DensityOptions& options, Progress& progress);
 
 }  // namespace bakewell

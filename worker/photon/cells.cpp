@@ -72,7 +72,9 @@ bool SurfaceCells::MeasurePatch(const World& world, const std::vector<uint32_t>&
     }
   }
   patch.origin = anchor + frame.t * static_cast<float>(low_x) + frame.b * static_cast<float>(low_y);
-  const auto divide = [this](double extent) { return std::max(1, static_cast<int>(std::ceil(extent / cell_size_m_ - 1e-3))); };
+  const auto divide = [this](double extent) {
+    return std::max(1, static_cast<int>(std::ceil(extent / cell_size_m_ - 1e-3)));
+  };
   patch.width = divide(high_x - low_x);
   patch.height = divide(high_y - low_y);
   const double side_x = high_x > low_x ? (high_x - low_x) / patch.width : cell_size_m_;
@@ -95,18 +97,19 @@ bool SurfaceCells::MeasurePatch(const World& world, const std::vector<uint32_t>&
     const Vec2d e1 = flat[1] - flat[0], e2 = flat[2] - flat[0];
     const double det = Cross(e1, e2);
     if (det == 0) continue;
-    RasterizeExact(flat[0], flat[1], flat[2], patch.width, patch.height, [&](int x, int y, const ConvexPolygon& polygon) {
-      CellSum& sum = sums[static_cast<size_t>(y) * static_cast<size_t>(patch.width) + static_cast<size_t>(x)];
-      const double projected = std::fabs(polygon.SignedArea());
-      Vec2d center;
-      for (int i = 0; i < polygon.count; ++i) center = center + polygon.corner[i] * (1.0 / polygon.count);
-      const Vec2d d = center - flat[0];
-      const double u = Cross(d, e2) / det, v = Cross(e1, d) / det;
-      sum.projected += projected;
-      sum.area += projected * per_projected;
-      sum.position += (ToDouble(t.p0) + ToDouble(t.e1) * u + ToDouble(t.e2) * v) * projected;
-      sum.normal += ToDouble(t.normal) * projected;
-    });
+    RasterizeExact(
+        flat[0], flat[1], flat[2], patch.width, patch.height, [&](int x, int y, const ConvexPolygon& polygon) {
+          CellSum& sum = sums[static_cast<size_t>(y) * static_cast<size_t>(patch.width) + static_cast<size_t>(x)];
+          const double projected = std::fabs(polygon.SignedArea());
+          Vec2d center;
+          for (int i = 0; i < polygon.count; ++i) center = center + polygon.corner[i] * (1.0 / polygon.count);
+          const Vec2d d = center - flat[0];
+          const double u = Cross(d, e2) / det, v = Cross(e1, d) / det;
+          sum.projected += projected;
+          sum.area += projected * per_projected;
+          sum.position += (ToDouble(t.p0) + ToDouble(t.e1) * u + ToDouble(t.e2) * v) * projected;
+          sum.normal += ToDouble(t.normal) * projected;
+        });
   }
   const double square = side_x * side_y;
   cells.clear();
@@ -116,7 +119,8 @@ bool SurfaceCells::MeasurePatch(const World& world, const std::vector<uint32_t>&
       cells.push_back({});
       continue;
     }
-    cells.push_back({static_cast<float>(sum.area * square), ToFloat(sum.position / sum.projected), ToFloat(NormalizeOrZero(sum.normal))});
+    cells.push_back({static_cast<float>(sum.area * square), ToFloat(sum.position / sum.projected),
+                     ToFloat(NormalizeOrZero(sum.normal))});
   }
   return true;
 }
@@ -141,7 +145,8 @@ SurfaceCells SurfaceCells::Build(const World& world, int64_t target_cells) {
   SurfaceCells result;
   for (const Triangle& t : world.triangles()) result.total_area_ += AreaOf(t);
   if (world.triangles().empty()) return result;
-  result.cell_size_m_ = static_cast<float>(std::sqrt(result.total_area_ / static_cast<double>(std::max<int64_t>(target_cells, 1))));
+  result.cell_size_m_ =
+      static_cast<float>(std::sqrt(result.total_area_ / static_cast<double>(std::max<int64_t>(target_cells, 1))));
   result.patch_of_triangle_.assign(world.triangles().size(), 0);
   for (auto& patch : GrowPatches(world)) result.AddPatch(world, std::move(patch));
   return result;

@@ -9,20 +9,20 @@ namespace bakewell {
 
 // The surface grid that photons are stored on. Triangles are grouped into patches: connected, facing within 35 degrees
 // of each other, projected to a plane of their own without folding over. A patch is cut into equal cells of about
-// cell_size_m a side that fill its bounding rectangle exactly; every cell knows the exact area of the surface inside it.
-// Cells exist for every triangle of the scene, lightmapped or not, and do not depend on anybody's UVs. Both sides of a
-// surface have flux of their own.
+// cell_size_m a side that fill its bounding rectangle exactly; every cell knows the exact area of the surface inside
+// it. Cells exist for every triangle of the scene, lightmapped or not, and do not depend on anybody's UVs. Both sides
+// of a surface have flux of their own.
 struct CellPatch {
-  Vec3f origin;           // [m]
-  Vec3f t, b;             // cells per metre: x = (p - origin) . t, y = (p - origin) . b
+  Vec3f origin;  // [m]
+  Vec3f t, b;    // cells per metre: x = (p - origin) . t, y = (p - origin) . b
   int32_t width = 0, height = 0;
   uint32_t first_cell = 0;  // cell (x, y) is first_cell + y * width + x
 };
 
 struct SurfaceCell {
-  float area = 0;    // of the surface inside [m^2]; 0: nothing there
-  Vec3f position;    // centroid of that surface [m]
-  Vec3f normal;      // unit, area-weighted, front
+  float area = 0;  // of the surface inside [m^2]; 0: nothing there
+  Vec3f position;  // centroid of that surface [m]
+  Vec3f normal;    // unit, area-weighted, front
 };
 
 class SurfaceCells {

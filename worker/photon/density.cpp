@@ -9,7 +9,8 @@
 namespace bakewell {
 namespace {
 
-constexpr std::array<std::array<int, 2>, 8> kSteps = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 1}, {-1, 1}, {-1, -1}, {1, -1}}};
+constexpr std::array<std::array<int, 2>, 8> kSteps = {
+    {{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 1}, {-1, 1}, {-1, -1}, {1, -1}}};
 
 // How far above the surface the short rays run, and how much of a cell other geometry may cut, in cells.
 constexpr float kLift = 0.02f, kMayCut = 0.04f;
@@ -47,11 +48,14 @@ class Estimator {
   }
 
   static size_t Index(const CellPatch& patch, int x, int y, int side) {
-    const size_t cell = patch.first_cell + static_cast<size_t>(y) * static_cast<size_t>(patch.width) + static_cast<size_t>(x);
+    const size_t cell =
+        patch.first_cell + static_cast<size_t>(y) * static_cast<size_t>(patch.width) + static_cast<size_t>(x);
     return 2 * cell + static_cast<size_t>(side);
   }
 
-  static bool Inside(const CellPatch& patch, int x, int y) { return x >= 0 && y >= 0 && x < patch.width && y < patch.height; }
+  static bool Inside(const CellPatch& patch, int x, int y) {
+    return x >= 0 && y >= 0 && x < patch.width && y < patch.height;
+  }
 
   // A side of a patch without a photon needs no probes: its estimate is zero whatever the neighbourhoods.
   bool Lit(const CellPatch& patch, int side) const {
@@ -75,7 +79,8 @@ class Estimator {
     }
   }
 
-  // Eight rays over the surface from the cell's centre: a free one opens the way to that neighbour, a short one cuts the cell.
+  // Eight rays over the surface from the cell's centre: a free one opens the way to that neighbour, a short one cuts
+  // the cell.
   void Probe(const CellPatch& patch, size_t i, int side, int x, int y) {
     const SurfaceCell& cell = cells_.cells()[i / 2];
     const Vec3f normal = side == 0 ? cell.normal : -cell.normal;
@@ -161,24 +166,29 @@ class Estimator {
     }
   }
 
+  // The radius follows from the density of photons in the widest neighbourhood, not from when a growing one happens to
+  // hold enough: that would favour neighbourhoods that are too bright (a bias of about one part in target_count).
   void Average(const CellPatch& patch, int x, int y, int side) {
     const size_t i = Index(patch, x, y, side);
     if (cells_.cells()[i / 2].area <= 0) return;
-    Sum sum;
-    AddCell(i, sum);
     int radius = 0;
-    if (!cut_[i]) {
-      while (sum.count < options_.target_count && radius < options_.max_radius && open_[i] != 0) {
-        sum = Flood(patch, x, y, side, ++radius);
-      }
+    if (!cut_[i] && open_[i] != 0) {
+      const Sum widest = Flood(patch, x, y, side, options_.max_radius);
+      const double per_area = static_cast<double>(widest.count) / widest.area;
+      const double cell_area = static_cast<double>(cells_.cell_size_m()) * static_cast<double>(cells_.cell_size_m());
+      while (radius < options_.max_radius &&
+             per_area * cell_area * (2 * radius + 1) * (2 * radius + 1) < options_.target_count)
+        ++radius;
+      if (radius == options_.max_radius) return Store(i, widest, radius);
     }
-    Store(i, sum, radius);
+    Store(i, Flood(patch, x, y, side, radius), radius);
   }
 
   void Store(size_t i, const Sum& sum, int radius) {
     const double per_area = inverse_scale_ / sum.area;
     const auto rgb = [&](const std::array<double, 3>& flux) {
-      return Rgb{static_cast<float>(flux[0] * per_area), static_cast<float>(flux[1] * per_area), static_cast<float>(flux[2] * per_area)};
+      return Rgb{static_cast<float>(flux[0] * per_area), static_cast<float>(flux[1] * per_area),
+                 static_cast<float>(flux[2] * per_area)};
     };
     cache_.irradiance[i] = {rgb(sum.direct), rgb(sum.indirect)};
     for (size_t g = 0; g < kVarianceGroups; ++g) {
@@ -200,8 +210,8 @@ class Estimator {
 
 }  // namespace
 
-RadianceCache EstimateDensity(const World& world, const SurfaceCells& cells, const PhotonMap& map, const PhotonPlan& plan,
-                              const DensityOptions& options, Progress& progress) {
+RadianceCache EstimateDensity(const World& world, const SurfaceCells& cells, const PhotonMap& map,
+                              const PhotonPlan& plan, const DensityOptions& options, Progress& progress) {
   return Estimator(world, cells, map, plan, options).Run(progress);
 }
 

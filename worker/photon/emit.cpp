@@ -31,15 +31,16 @@ float SpotCosine(const PunctualLight& light, float u) {
 Photon FromPunctual(const PunctualLight& light, Vec2f u, double photons) {
   const Frame frame = FrameFromHint(light.direction, light.tangent);
   if (light.type == LightType::kPoint) {
-    return {light.position, frame.ToWorld(UniformSphere(u)), light.intensity * static_cast<float>(4 * kPi / photons), 0};
+    return {light.position, frame.ToWorld(UniformSphere(u)), light.intensity * static_cast<float>(4 * kPi / photons),
+            0};
   }
   const float flat = 1 - light.cos_inner, rim = (light.cos_inner - light.cos_outer) / 3;
   return {light.position, frame.ToWorld(DirectionFromCosine(SpotCosine(light, u.x), u.y)),
           light.intensity * static_cast<float>(2 * kPi * static_cast<double>(flat + rim) / photons), 0};
 }
 
-Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_position, Vec2f u_direction, float u_side,
-                    double photons) {
+Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_position, Vec2f u_direction,
+                    float u_side, double photons) {
   const Triangle& t = world.triangles()[light.triangle];
   const Vec2f b = TriangleFromSquare(u_position);
   const SurfacePoint point = world.PointAt(light.triangle, b.x, b.y, light.two_sided && u_side < 0.5f);
@@ -47,15 +48,18 @@ Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_p
   const double sides = light.two_sided ? 2 : 1;
   return {RayOrigin(point), frame.ToWorld(CosineHemisphere(u_direction)),
           world.FrontEmissionAt(light.triangle, b.x, b.y) *
-              static_cast<float>(kPi * static_cast<double>(light.area) * sides / photons), 0};
+              static_cast<float>(kPi * static_cast<double>(light.area) * sides / photons),
+          0};
 }
 
 // A photon that crosses the square of side 2R behind the scene at `point`.
-Photon FromSquare(const World& world, const Frame& frame, const EmissionGuide::SquarePoint& point, Rgb per_area, double photons) {
+Photon FromSquare(const World& world, const Frame& frame, const EmissionGuide::SquarePoint& point, Rgb per_area,
+                  double photons) {
   const float r = world.radius();
   const float area = 4 * r * r;
   const Vec3f on_square = world.center() + frame.t * (point.position.x * r) + frame.b * (point.position.y * r);
-  return {on_square + frame.n * (2 * r), -frame.n, per_area * static_cast<float>(area / (static_cast<double>(point.density) * photons)), 0};
+  return {on_square + frame.n * (2 * r), -frame.n,
+          per_area * static_cast<float>(area / (static_cast<double>(point.density) * photons)), 0};
 }
 
 class Emitter {
@@ -63,32 +67,31 @@ class Emitter {
   Emitter(const World& world, const LightSet& lights, const EmissionGuide& guide, const PhotonPlan& plan)
       : world_(world), lights_(lights), guide_(guide), plan_(plan) {}
 
-  Photon Emit(const PhotonSource& source, const SobolSet& set, int64_t photon) const {
-    const uint32_t i = static_cast<uint32_t>(photon - source.first);
-    Photon result = Draw(source, set, i);
+  Photon Emit(const PhotonSource& source, const SobolPoint& u, int64_t photon) const {
+    Photon result = Draw(source, u);
     result.key = HashCombine(HashCombine(plan_.seed, 0x9107u), HashWide(static_cast<uint64_t>(photon)));
     return result;
   }
 
  private:
-  Photon Draw(const PhotonSource& source, const SobolSet& set, uint32_t i) const {
+  Photon Draw(const PhotonSource& source, const SobolPoint& u) const {
     const double n = static_cast<double>(source.count);
     if (source.kind == PhotonSource::Kind::kDirectional) {
-      const LightSample sun = lights_.SampleDirectional(source.light, set.Get2(i, 2));
+      const LightSample sun = lights_.SampleDirectional(source.light, u.Get2(2));
       Frame frame = SunFrame(lights_.directionals()[source.light]);
-      const auto point = guide_.DrawSun(source.light, set.Get2(i, 0));
+      const auto point = guide_.DrawSun(source.light, u.Get2(0));
       Photon photon = FromSquare(world_, frame, point, lights_.directionals()[source.light].intensity, n);
       photon.origin += (sun.dir - frame.n) * (2 * world_.radius());
       photon.dir = -sun.dir;
       return photon;
     }
     if (source.kind == PhotonSource::Kind::kSky) {
-      const auto sky = guide_.DrawSky(set.Get2(i, 2), set.Get2(i, 0));
+      const auto sky = guide_.DrawSky(u.Get2(2), u.Get2(0));
       return FromSquare(world_, SkyFrame(sky.dir), sky.point, lights_.environment().Radiance(sky.dir) / sky.pdf, n);
     }
-    if (!lights_.IsEmissive(source.light)) return FromPunctual(lights_.locals()[source.light], set.Get2(i, 0), n);
+    if (!lights_.IsEmissive(source.light)) return FromPunctual(lights_.locals()[source.light], u.Get2(0), n);
     const EmissiveTriangle& triangle = lights_.emissive()[static_cast<size_t>(source.light) - lights_.locals().size()];
-    return FromTriangle(world_, triangle, set.Get2(i, 2), set.Get2(i, 0), set.Get(i, 7), n);
+    return FromTriangle(world_, triangle, u.Get2(2), u.Get2(0), u.Get(7), n);
   }
 
   const World& world_;
@@ -107,7 +110,7 @@ class Tracer {
   Tracer(const World& world, const SurfaceCells& cells, double scale, PhotonMap& map)
       : world_(world), cells_(cells), scale_(scale), map_(map) {}
 
-  void Trace(const Photon& photon, const SobolSet& set, uint32_t index, int group) {
+  void Trace(const Photon& photon, const SobolPoint& u, int group) {
     Ray ray{photon.origin, photon.dir, kInfinity, photon.key};
     Rgb flux = photon.flux;
     Accumulate(totals_.emitted, ToFixed(flux));
@@ -121,15 +124,16 @@ class Tracer {
       const float survive = MaxComponent(albedo);
       const Fixed before = ToFixed(flux);
       if (bounce + 1 == kMaxPhotonBounces) ++totals_.cut_paths;
-      if (Random(photon, set, index, bounce, 2) >= survive || bounce + 1 == kMaxPhotonBounces) {
+      if (Random(photon, u, bounce, 2) >= survive || bounce + 1 == kMaxPhotonBounces) {
         return Accumulate(totals_.absorbed, before);
       }
       flux = flux * albedo / survive;
       const Fixed after = ToFixed(flux);
       Accumulate(totals_.absorbed, {before[0] - after[0], before[1] - after[1], before[2] - after[2]});
       const Frame frame = FrameFromHint(point.normal, world_.triangles()[hit.triangle].e1);
-      const Vec2f u{Random(photon, set, index, bounce, 0), Random(photon, set, index, bounce, 1)};
-      ray = {RayOrigin(point), frame.ToWorld(CosineHemisphere(u)), kInfinity, photon.key + static_cast<uint32_t>(bounce) + 1};
+      const Vec2f scatter{Random(photon, u, bounce, 0), Random(photon, u, bounce, 1)};
+      ray = {RayOrigin(point), frame.ToWorld(CosineHemisphere(scatter)), kInfinity,
+             photon.key + static_cast<uint32_t>(bounce) + 1};
     }
   }
 
@@ -147,8 +151,8 @@ class Tracer {
 
  private:
   // The first scattering follows the emission's Sobol points, later ones hashed numbers.
-  float Random(const Photon& photon, const SobolSet& set, uint32_t index, int bounce, int what) const {
-    if (bounce == 0) return set.Get(index, 4 + what);
+  float Random(const Photon& photon, const SobolPoint& u, int bounce, int what) const {
+    if (bounce == 0) return u.Get(4 + what);
     return UnitFloat(HashCombine(photon.key, static_cast<uint32_t>(4 * bounce + what)));
   }
 
@@ -194,7 +198,8 @@ float UsefulFlux(const LightSet& lights, const EmissionGuide& guide, const Photo
 // A bound of the flux that one of the source's photons carries, from its closed form.
 float MaxWeight(const LightSet& lights, const PhotonSource& source) {
   const double n = static_cast<double>(source.count);
-  const double square = 4.0 * static_cast<double>(lights.world().radius()) * static_cast<double>(lights.world().radius());
+  const double square =
+      4.0 * static_cast<double>(lights.world().radius()) * static_cast<double>(lights.world().radius());
   const double share = EmissionGuide::kUniformShare;
   double flux = 0;
   if (source.kind == PhotonSource::Kind::kDirectional) {
@@ -249,9 +254,10 @@ void EmitPhotons(const World& world, const LightSet& lights, const EmissionGuide
     const int64_t first = std::max(begin, source.first), last = std::min(end, source.first + source.count);
     for (int64_t photon = first; photon < last; ++photon) {
       if ((photon & 1023) == 0 && progress.Cancelled()) break;
-      const Photon drawn = emitter.Emit(source, set, photon);
+      const SobolPoint u = set.At(static_cast<uint32_t>(photon - source.first));
+      const Photon drawn = emitter.Emit(source, u, photon);
       BAKEWELL_CHECK_OP(MaxComponent(drawn.flux), <=, source.max_weight);
-      tracer.Trace(drawn, set, static_cast<uint32_t>(photon - source.first), static_cast<int>(photon % kVarianceGroups));
+      tracer.Trace(drawn, u, static_cast<int>(photon % kVarianceGroups));
     }
   }
   tracer.Flush();

@@ -13,7 +13,9 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int kMaxWalk = 5;
 
-int Bin(float unit, int grid) { return std::clamp(static_cast<int>((unit * 0.5f + 0.5f) * static_cast<float>(grid)), 0, grid - 1); }
+int Bin(float unit, int grid) {
+  return std::clamp(static_cast<int>((unit * 0.5f + 0.5f) * static_cast<float>(grid)), 0, grid - 1);
+}
 
 // Adds every bin's eight neighbours, so that the edge of a window is not lost between marks.
 std::vector<float> Widen(std::span<const float> bins, int grid) {
@@ -24,7 +26,8 @@ std::vector<float> Widen(std::span<const float> bins, int grid) {
         for (int dx = -1; dx <= 1; ++dx) {
           const int nx = x + dx, ny = y + dy;
           if (nx < 0 || ny < 0 || nx >= grid || ny >= grid) continue;
-          wide[static_cast<size_t>(y * grid + x)] += bins[static_cast<size_t>(ny * grid + nx)] * (dx == 0 && dy == 0 ? 1.0f : 0.25f);
+          wide[static_cast<size_t>(y * grid + x)] +=
+              bins[static_cast<size_t>(ny * grid + nx)] * (dx == 0 && dy == 0 ? 1.0f : 0.25f);
         }
       }
     }
@@ -70,10 +73,12 @@ Vec2f OnSquare(const World& world, const Frame& frame, Vec3f p) {
 
 }  // namespace
 
-int EmissionGuide::SkyBin(int x, int y) const { return (y * kSkyRows / sky_height_) * kSkyColumns + x * kSkyColumns / sky_width_; }
+int EmissionGuide::SkyBin(int x, int y) const {
+  return (y * kSkyRows / sky_height_) * kSkyColumns + x * kSkyColumns / sky_width_;
+}
 
-EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, const AtlasLayout& layout, const TexelMap& map,
-                                   int walks, uint32_t seed) {
+EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, const AtlasLayout& layout,
+                                   const TexelMap& map, int walks, uint32_t seed) {
   EmissionGuide guide;
   guide.sky_width_ = lights.environment().width();
   guide.sky_height_ = lights.environment().height();
@@ -94,15 +99,18 @@ EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, c
   const auto mark_sky = [&](Vec3f from, Vec3f dir) {
     if (!lights.environment().bright()) return;
     const float phi = std::atan2(dir.z, dir.x) / (2 * kPiF), v = std::acos(std::clamp(dir.y, -1.0f, 1.0f)) / kPiF;
-    const int x = std::clamp(static_cast<int>((phi < 0 ? phi + 1 : phi) * static_cast<float>(guide.sky_width_)), 0, guide.sky_width_ - 1);
+    const int x = std::clamp(static_cast<int>((phi < 0 ? phi + 1 : phi) * static_cast<float>(guide.sky_width_)), 0,
+                             guide.sky_width_ - 1);
     const int y = std::clamp(static_cast<int>(v * static_cast<float>(guide.sky_height_)), 0, guide.sky_height_ - 1);
     const Vec2f p = OnSquare(world, SkyFrame(dir), from);
-    marks.sky[static_cast<size_t>((guide.SkyBin(x, y) * kSkyGrid + Bin(p.y, kSkyGrid)) * kSkyGrid + Bin(p.x, kSkyGrid))] += 1;
+    marks.sky[static_cast<size_t>((guide.SkyBin(x, y) * kSkyGrid + Bin(p.y, kSkyGrid)) * kSkyGrid +
+                                  Bin(p.x, kSkyGrid))] += 1;
   };
   for (int walk = 0; walk < walks; ++walk) {
     const uint32_t key = HashCombine(HashCombine(seed, 0x6a1d3u), static_cast<uint32_t>(walk));
     const auto random = [&](int i) { return UnitFloat(HashCombine(key, static_cast<uint32_t>(i))); };
-    const size_t which = std::min(map.texels.size() - 1, static_cast<size_t>(random(0) * static_cast<float>(map.texels.size())));
+    const size_t which =
+        std::min(map.texels.size() - 1, static_cast<size_t>(random(0) * static_cast<float>(map.texels.size())));
     const TexelPoint start = TexelSampler(world, layout, map, map.texels[which]).At({random(1), random(2)});
     SurfacePoint at = start.surface;
     Frame frame = start.frame;
@@ -165,7 +173,8 @@ EmissionGuide::SquarePoint EmissionGuide::Draw(const Distribution2D& table, Vec2
 EmissionGuide::SkyPoint EmissionGuide::DrawSky(Vec2f u_direction, Vec2f u_position) const {
   const auto cell = sky_direction_.Draw(u_direction);
   const float step = kPiF / static_cast<float>(sky_height_);
-  const float top = std::cos(static_cast<float>(cell.y) * step), bottom = std::cos(static_cast<float>(cell.y + 1) * step);
+  const float top = std::cos(static_cast<float>(cell.y) * step),
+              bottom = std::cos(static_cast<float>(cell.y + 1) * step);
   const float within = cell.position.y * static_cast<float>(sky_height_) - static_cast<float>(cell.y);
   const float y = top + (bottom - top) * within;
   const float s = std::sqrt(std::max(0.0f, 1 - y * y)), phi = cell.position.x * 2 * kPiF;

@@ -24,13 +24,13 @@ class EmissionGuide {
                              int walks, uint32_t seed);
 
   struct SquarePoint {
-    Vec2f position;        // in [-1, 1]^2, in units of R
-    float density = 0;     // relative to uniform (1 = uniform)
+    Vec2f position;     // in [-1, 1]^2, in units of R
+    float density = 0;  // relative to uniform (1 = uniform)
   };
   SquarePoint DrawSun(int directional, Vec2f u) const { return Draw(sun_[directional], u); }
   struct SkyPoint {
-    Vec3f dir;             // unit, towards the sky
-    float pdf = 0;         // per steradian
+    Vec3f dir;      // unit, towards the sky
+    float pdf = 0;  // per steradian
     SquarePoint point;
   };
   SkyPoint DrawSky(Vec2f u_direction, Vec2f u_position) const;
@@ -48,7 +48,7 @@ class EmissionGuide {
 
   std::vector<Distribution2D> sun_;
   std::vector<float> sun_useful_;
-  Distribution2D sky_direction_;         // over the environment's table
+  Distribution2D sky_direction_;              // over the environment's table
   std::vector<Distribution2D> sky_position_;  // per direction bin
   int sky_width_ = 1, sky_height_ = 1;
   float sky_useful_ = 1;

@@ -171,6 +171,7 @@ absl::Status Worker::Run() {
     link_.HangUp();
   });
   absl::Status refusal;
+  absl::StatusCode outage = absl::StatusCode::kOk;  // said once, not at every try
   while (!ShouldLeave()) {
     const absl::Status status = Session();
     if (ShouldLeave()) break;
@@ -179,7 +180,8 @@ absl::Status Worker::Run() {
       refusal = status;
       break;
     }
-    options_.log(absl::StrCat("connection lost: ", status.ToString()));
+    if (status.code() != outage) options_.log(absl::StrCat("connection lost: ", status.ToString()));
+    outage = status.code();
     Pause(std::chrono::milliseconds(300));
   }
   Drain();
@@ -231,10 +233,14 @@ void Worker::Leave() {
 }
 
 void Worker::HeartbeatLoop() {
+  Clock::time_point beat{};
   std::unique_lock lock(mutex_);
   while (!ended_) {
-    changed_.wait_for(lock, heartbeat_, [this] { return ended_; });
-    if (ended_ || worker_id_ == 0) continue;
+    // Short waits, since a registration may ask for faster heartbeats than were in force before.
+    changed_.wait_for(lock, std::min<std::chrono::microseconds>(heartbeat_, std::chrono::milliseconds(100)),
+                      [this] { return ended_; });
+    if (ended_ || worker_id_ == 0 || Clock::now() - beat < heartbeat_) continue;
+    beat = Clock::now();
     const uint64_t id = worker_id_;
     lock.unlock();
     const absl::Status status = link_.Heartbeat(id);

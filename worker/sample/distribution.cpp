@@ -30,7 +30,8 @@ Distribution2D::Distribution2D(int width, int height, std::span<const float> wei
   std::vector<float> row_totals;
   rows_.reserve(static_cast<size_t>(height));
   for (int y = 0; y < height; ++y) {
-    rows_.emplace_back(weights.subspan(static_cast<size_t>(y) * static_cast<size_t>(width), static_cast<size_t>(width)));
+    rows_.emplace_back(
+        weights.subspan(static_cast<size_t>(y) * static_cast<size_t>(width), static_cast<size_t>(width)));
     row_totals.push_back(static_cast<float>(rows_.back().total()));
   }
   marginal_ = Distribution1D(row_totals);

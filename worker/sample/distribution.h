@@ -37,8 +37,8 @@ class Distribution2D {
 
   struct Sample {
     int x = 0, y = 0;
-    Vec2f position;    // in the unit square
-    float pdf = 0;     // per unit square area
+    Vec2f position;  // in the unit square
+    float pdf = 0;   // per unit square area
   };
   Sample Draw(Vec2f u) const;
   float Pdf(int x, int y) const;
@@ -47,8 +47,8 @@ class Distribution2D {
 
  private:
   int width_ = 1, height_ = 1;
-  Distribution1D marginal_;            // rows
-  std::vector<Distribution1D> rows_;   // columns in each row
+  Distribution1D marginal_;           // rows
+  std::vector<Distribution1D> rows_;  // columns in each row
 };
 
 }  // namespace bakewell

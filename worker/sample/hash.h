@@ -15,7 +15,9 @@ constexpr uint32_t Hash(uint32_t x) {
   return x;
 }
 
-constexpr uint32_t HashCombine(uint32_t a, uint32_t b) { return Hash(a ^ (Hash(b) + 0x9e3779b9U + (a << 6) + (a >> 2))); }
+constexpr uint32_t HashCombine(uint32_t a, uint32_t b) {
+  return Hash(a ^ (Hash(b) + 0x9e3779b9U + (a << 6) + (a >> 2)));
+}
 
 // 64 bits to 32, for counters that may pass 2^32.
 constexpr uint32_t HashWide(uint64_t x) {

@@ -37,16 +37,17 @@ inline ConvexPolygon ClipHalfPlane(const ConvexPolygon& polygon, int axis, doubl
   return out;
 }
 
-// The part of a triangle inside the unit square whose least corner is (x, y).
-inline ConvexPolygon ClipToCell(const ConvexPolygon& triangle, int x, int y) {
-  ConvexPolygon part = ClipHalfPlane(triangle, 1, y, 1);
-  part = ClipHalfPlane(part, 1, y + 1, -1);
-  part = ClipHalfPlane(part, 0, x, 1);
-  return ClipHalfPlane(part, 0, x + 1, -1);
+// The part of a triangle inside the square of side `side` whose least corner is `corner`.
+inline ConvexPolygon ClipToSquare(const ConvexPolygon& triangle, Vec2d corner, double side) {
+  ConvexPolygon part = ClipHalfPlane(triangle, 1, corner.y, 1);
+  part = ClipHalfPlane(part, 1, corner.y + side, -1);
+  part = ClipHalfPlane(part, 0, corner.x, 1);
+  return ClipHalfPlane(part, 0, corner.x + side, -1);
 }
 
 // Calls visit(x, y, polygon) for every cell of the grid [0, width) x [0, height) that the triangle covers with an area
-// above zero, with the exact part inside the cell. Row by row, so the cost is that of the cells, not of the bounding box.
+// above zero, with the exact part inside the cell. Row by row, so the cost is that of the cells, not of the bounding
+// box.
 template <typename Visit>
 void RasterizeExact(Vec2d a, Vec2d b, Vec2d c, int width, int height, Visit visit) {
   const ConvexPolygon triangle{3, {a, b, c}};

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/base/check.h"
 #include "worker/sample/warp.h"
 #include "worker/texel/raster.h"
 
@@ -27,41 +28,48 @@ PageToWorld MapOf(const Triangle& t, const std::array<Vec2d, 3>& c) {
   return map;
 }
 
-Vec2f ToUnit(Vec2d p, int x, int y) { return {static_cast<float>(p.x - x), static_cast<float>(p.y - y)}; }
+Vec2f ToUnit(Vec2d p, Vec2d texel) { return {static_cast<float>(p.x - texel.x), static_cast<float>(p.y - texel.y)}; }
 
 }  // namespace
 
-void TexelSampler::AddFragment(const World& world, const AtlasLayout& layout, const TexelFragment& fragment, int x, int y) {
+void TexelSampler::AddFragment(const World& world, const AtlasLayout& layout, const TexelFragment& fragment,
+                               const Window& window, Vec2d texel) {
   const Triangle& t = world.triangles()[fragment.triangle];
   const auto corners = TexelCorners(world, layout, fragment.triangle);
+  const ConvexPolygon polygon = ClipToSquare({3, {corners[0], corners[1], corners[2]}}, window.corner, window.side);
+  const double area = std::fabs(polygon.SignedArea());
+  if (polygon.count < 3 || area <= 0) return;
   const PageToWorld map = MapOf(t, corners);
   const SurfacePoint point = world.PointAt(fragment.triangle, 0, 0, false);
   sides_.push_back({FrameFromHint(t.normal, ToFloat(NormalizeOrZero(map.per_x))), point.offset});
-  radius_ = std::max(radius_, static_cast<float>(0.5 * std::max(Length(map.per_x + map.per_y), Length(map.per_x - map.per_y))));
-  const uint16_t side = static_cast<uint16_t>(sides_.size() - 1);
-  const float before = parts_.empty() ? 0.0f : parts_.back().cdf;
-  const auto add = [&](Vec2d a, Vec2d b, Vec2d c, bool whole, float share) {
+  radius_ = std::max(radius_,
+                     static_cast<float>(0.5 * std::max(Length(map.per_x + map.per_y), Length(map.per_x - map.per_y))));
+  const auto add = [&](Vec2d a, Vec2d b, Vec2d c, bool whole, double share) {
+    const float before = parts_.empty() ? 0.0f : parts_.back().cdf;
     const Vec3d p = map.At(a);
-    parts_.push_back({ToFloat(p), ToFloat(map.At(b) - p), ToFloat(map.At(c) - p), ToUnit(a, x, y), ToUnit(b, x, y) - ToUnit(a, x, y),
-                      ToUnit(c, x, y) - ToUnit(a, x, y), whole, side, share});
+    parts_.push_back({ToFloat(p), ToFloat(map.At(b) - p), ToFloat(map.At(c) - p), ToUnit(a, texel),
+                      ToUnit(b, texel) - ToUnit(a, texel), ToUnit(c, texel) - ToUnit(a, texel), whole,
+                      static_cast<uint16_t>(sides_.size() - 1), before + static_cast<float>(share)});
   };
-  if (fragment.coverage > 1 - 1e-6f) {
-    const Vec2d corner{static_cast<double>(x), static_cast<double>(y)};
-    add(corner, corner + Vec2d{1, 0}, corner + Vec2d{0, 1}, true, before + fragment.coverage);
-    return;
+  if (area > window.side * window.side * (1 - 1e-6)) {
+    return add(window.corner, window.corner + Vec2d{window.side, 0}, window.corner + Vec2d{0, window.side}, true, area);
   }
-  const ConvexPolygon polygon = ClipToCell({3, {corners[0], corners[1], corners[2]}}, x, y);
-  double sum = 0;
   for (int i = 1; i + 1 < polygon.count; ++i) {
-    sum += 0.5 * std::fabs(Cross(polygon.corner[i] - polygon.corner[0], polygon.corner[i + 1] - polygon.corner[0]));
-    add(polygon.corner[0], polygon.corner[i], polygon.corner[i + 1], false, before + static_cast<float>(sum));
+    const Vec2d a = polygon.corner[0], b = polygon.corner[i], c = polygon.corner[i + 1];
+    add(a, b, c, false, 0.5 * std::fabs(Cross(b - a, c - a)));
   }
 }
 
 TexelSampler::TexelSampler(const World& world, const AtlasLayout& layout, const TexelMap& map, const Texel& texel) {
-  for (uint32_t f = texel.fragment_begin; f < texel.fragment_end; ++f) {
-    AddFragment(world, layout, map.fragments[f], texel.x, texel.y);
+  const Vec2d corner{static_cast<double>(texel.x), static_cast<double>(texel.y)};
+  const double inset = 0.5 - 0.5 * static_cast<double>(map.footprint);
+  for (const Window& window : {Window{corner + Vec2d{inset, inset}, map.footprint}, Window{corner, 1}}) {
+    for (uint32_t f = texel.fragment_begin; f < texel.fragment_end; ++f) {
+      AddFragment(world, layout, map.fragments[f], window, corner);
+    }
+    if (!parts_.empty()) break;
   }
+  BAKEWELL_CHECK(!parts_.empty());
   const float total = parts_.back().cdf;
   for (Part& part : parts_) part.cdf = total > 0 ? part.cdf / total : 1.0f;
 }

@@ -50,7 +50,8 @@ std::vector<Piece> ClipAll(const World& world, const AtlasLayout& layout) {
     const PageSize size = layout.pages[page];
     const auto [a, b, c] = TexelCorners(world, layout, k);
     RasterizeExact(a, b, c, size.width, size.height, [&](int x, int y, const ConvexPolygon& polygon) {
-      pieces.push_back({page, TileOf(x, y, size.width), y, x, chart, k, std::fabs(polygon.SignedArea()), Centroid(polygon)});
+      pieces.push_back(
+          {page, TileOf(x, y, size.width), y, x, chart, k, std::fabs(polygon.SignedArea()), Centroid(polygon)});
     });
   }
   std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.Order() < b.Order(); });
@@ -122,8 +123,9 @@ std::array<Vec2d, 3> TexelCorners(const World& world, const AtlasLayout& layout,
   return corners;
 }
 
-TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout) {
+TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout, float footprint) {
   TexelMap map;
+  map.footprint = footprint;
   map.pages = layout.pages;
   for (const PageSize& page : layout.pages) {
     map.texel_at.emplace_back(static_cast<size_t>(page.width) * static_cast<size_t>(page.height), -1);
@@ -142,7 +144,8 @@ TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout) {
     }
     texel.fragment_end = static_cast<uint32_t>(map.fragments.size());
     map.overlapping_texels += overlaps ? 1 : 0;
-    if (tile != std::pair(group[0].page, group[0].tile)) map.tile_begin.push_back(static_cast<uint32_t>(map.texels.size()));
+    if (tile != std::pair(group[0].page, group[0].tile))
+      map.tile_begin.push_back(static_cast<uint32_t>(map.texels.size()));
     tile = {group[0].page, group[0].tile};
     const size_t row = static_cast<size_t>(texel.y) * static_cast<size_t>(map.pages[texel.page].width);
     map.texel_at[texel.page][row + static_cast<size_t>(texel.x)] = static_cast<int32_t>(map.texels.size());

@@ -21,12 +21,12 @@ struct Texel {
   int32_t x = 0, y = 0;
   int32_t chart = kNoChart;
   uint32_t fragment_begin = 0, fragment_end = 0;  // TexelMap::fragments
-  float coverage = 0;    // share of the square that triangles cover, (0, 1] (above 1 where charts overlap)
-  float area = 0;        // of the covered surface [m^2]
-  Vec3f position;        // centroid of the covered surface [m]
-  Vec3f normal;          // unit, geometric, area-weighted
-  Vec3f smooth_normal;   // unit, interpolated shading normal
-  bool flat = true;      // all fragments share the normal
+  float coverage = 0;   // share of the square that triangles cover, (0, 1] (above 1 where charts overlap)
+  float area = 0;       // of the covered surface [m^2]
+  Vec3f position;       // centroid of the covered surface [m]
+  Vec3f normal;         // unit, geometric, area-weighted
+  Vec3f smooth_normal;  // unit, interpolated shading normal
+  bool flat = true;     // all fragments share the normal
 };
 
 // All covered texels of a layout, sorted by page, then tile (16 x 16 texels, row by row), then y, x.
@@ -39,14 +39,15 @@ struct TexelMap {
   // Texels [tile_begin[k], tile_begin[k+1]) are tile k.
   std::vector<uint32_t> tile_begin;
   int64_t overlapping_texels = 0;  // covered by more than one chart
+  float footprint = 1;             // side of the square about a texel's centre that its value averages [texels]
 
   int tile_count() const { return static_cast<int>(tile_begin.size()) - 1; }
 };
 
 inline constexpr int kTileSide = 16;
 
-// Rasterises every charted triangle exactly: area of texel and triangle clipped, not centres.
-TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout);
+// Rasterises every charted triangle exactly: area of texel and triangle clipped, not centres. footprint is in (0, 1].
+TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout, float footprint);
 
 // Corners of a charted triangle on its page [texels].
 std::array<Vec2d, 3> TexelCorners(const World& world, const AtlasLayout& layout, uint32_t triangle);

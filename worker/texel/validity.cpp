@@ -16,10 +16,11 @@ bool MeetsBack(const World& world, const Hit& hit) {
 }
 
 // Share of `count` cosine-weighted rays that meet a back face first.
-float BackShare(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, int count, int& rays) {
+float BackShare(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, int count,
+                int& rays) {
   int backs = 0;
   for (int i = 0; i < count; ++i) {
-    const Vec3f dir = frame.ToWorld(CosineHemisphere(set.Get2(static_cast<uint32_t>(i), 0)));
+    const Vec3f dir = frame.ToWorld(CosineHemisphere(set.At(static_cast<uint32_t>(i)).Get2(0)));
     backs += MeetsBack(world, world.Intersect({RayOrigin(from), dir, kInfinity, set.key()})) ? 1 : 0;
   }
   rays += count;

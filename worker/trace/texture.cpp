@@ -75,7 +75,8 @@ Rgb SampleColor(const Texture& texture, const TextureRef& ref, Vec2f uv) {
 
 float SampleAlpha(const Texture& texture, const TextureRef& ref, Vec2f uv) {
   float sum = 0;
-  Filter(texture, ref, uv, [&](const uint8_t* texel, float weight) { sum += static_cast<float>(texel[3]) / 255.0f * weight; });
+  Filter(texture, ref, uv,
+         [&](const uint8_t* texel, float weight) { sum += static_cast<float>(texel[3]) / 255.0f * weight; });
   return sum;
 }
 

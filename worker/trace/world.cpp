@@ -94,10 +94,10 @@ void World::AddGeometry(uint32_t begin, uint32_t end, bool filtered) {
   if (begin == end) return;
   const size_t count = end - begin;
   RTCGeometry geometry = rtcNewGeometry(device_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               3 * sizeof(float), 3 * count));
-  auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                 3 * sizeof(uint32_t), count));
+  auto* vertices = static_cast<float*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * count));
+  auto* indices = static_cast<uint32_t*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), count));
   for (size_t k = 0; k < count; ++k) {
     const Triangle& t = triangles_[begin + k];
     const Object& object = scene_.objects[t.object];
@@ -235,7 +235,8 @@ Rgb World::FrontEmissionAt(uint32_t triangle, float u, float v) const {
   const Material& material = MaterialOf(t);
   if (material.emission_texture.texture < 0 || MaxComponent(material.emission) <= 0) return material.emission;
   const Vec2f uv = TexcoordAt(t, material.emission_texture.texcoord, u, v);
-  return material.emission * SampleColor(scene_.textures[material.emission_texture.texture], material.emission_texture, uv);
+  return material.emission *
+         SampleColor(scene_.textures[material.emission_texture.texture], material.emission_texture, uv);
 }
 
 Rgb World::EmissionAt(const Hit& hit) const {

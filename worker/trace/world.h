@@ -23,9 +23,9 @@ struct Triangle {
 
 struct Ray {
   Vec3f origin;
-  Vec3f dir;             // unit
-  float t_max;           // [m], infinity allowed
-  uint32_t key = 0;      // decides what a BLEND surface lets through
+  Vec3f dir;         // unit
+  float t_max;       // [m], infinity allowed
+  uint32_t key = 0;  // decides what a BLEND surface lets through
 };
 
 inline constexpr uint32_t kNoTriangle = ~0u;

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -42,6 +43,25 @@ class AccessorReader {
 
   absl::Status Error(const std::string& reason) const {
     return absl::InvalidArgumentError(absl::StrCat(NameOf(source_.document.json, "accessors", index_), ": ", reason));
+  }
+
+  absl::StatusOr<Elements> Gather(std::span<const uint32_t> which) const {
+    const int components = tinygltf::GetNumComponentsInType(static_cast<uint32_t>(accessor_.type));
+    const bool plain = accessor_.bufferView >= 0 && !accessor_.sparse.isSparse;
+    if (!plain) return GatherFloats(which, components);
+    BAKEWELL_RETURN_IF_ERROR(CheckType(components));
+    BAKEWELL_ASSIGN_OR_RETURN(Layout layout, Main(components));
+    Elements elements = Header(layout);
+    for (const uint32_t i : which) {
+      elements.bytes.append(
+          layout.bytes.substr(i * layout.stride, layout.component_bytes * static_cast<size_t>(components)));
+      elements.bytes.resize((elements.bytes.size() + 3) / 4 * 4);
+    }
+    layout.normalized = false;
+    std::vector<double> raw(which.size() * static_cast<size_t>(components));
+    for (size_t k = 0; k < which.size(); ++k) Decode(layout, which[k], &raw[k * static_cast<size_t>(components)]);
+    SetBounds(raw, static_cast<size_t>(components), elements.header);
+    return elements;
   }
 
   bool HoldsIndices() const { return IsUnsigned(accessor_.componentType) && !accessor_.normalized; }
@@ -88,6 +108,44 @@ class AccessorReader {
   absl::StatusOr<Layout> Main(int components) const {
     Layout layout{{}, 0, 0, components, accessor_.componentType, accessor_.normalized};
     return Locate(layout, accessor_.bufferView, accessor_.byteOffset, accessor_.count);
+  }
+
+  Elements Header(const Layout& layout) const {
+    Elements elements;
+    const size_t element_bytes = layout.component_bytes * static_cast<size_t>(layout.components);
+    elements.stride_bytes = (element_bytes + 3) / 4 * 4;
+    elements.padded = elements.stride_bytes != element_bytes;
+    const auto& type = source_.document.json["accessors"][static_cast<size_t>(index_)]["type"];
+    elements.header = {{"componentType", layout.component_type}, {"type", type}};
+    if (layout.normalized) elements.header["normalized"] = true;
+    return elements;
+  }
+
+  absl::StatusOr<Elements> GatherFloats(std::span<const uint32_t> which, int components) const {
+    BAKEWELL_ASSIGN_OR_RETURN(const std::vector<double> values, Read(components));
+    const auto width = static_cast<size_t>(components);
+    Elements elements = Header({{}, 0, sizeof(float), components, TINYGLTF_COMPONENT_TYPE_FLOAT, false});
+    std::vector<double> chosen;
+    for (const uint32_t i : which) {
+      for (size_t c = 0; c < width; ++c) {
+        chosen.push_back(values[i * width + c]);
+        const auto value = static_cast<float>(chosen.back());
+        elements.bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+      }
+    }
+    SetBounds(chosen, width, elements.header);
+    return elements;
+  }
+
+  // min and max over the elements, where they are numbers (JSON has no others).
+  static void SetBounds(const std::vector<double>& values, size_t width, nlohmann::json& header) {
+    if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) return;
+    for (size_t i = 0; i < values.size(); ++i) {
+      nlohmann::json& low = header["min"][i % width];
+      nlohmann::json& high = header["max"][i % width];
+      low = i < width ? values[i] : std::min(low.get<double>(), values[i]);
+      high = i < width ? values[i] : std::max(high.get<double>(), values[i]);
+    }
   }
 
   // Fills in bytes and stride, or says that `count` elements do not fit. All sums stay far below 2^64: sizes are below
@@ -193,6 +251,10 @@ absl::StatusOr<std::vector<uint32_t>> ReadIndices(const Source& source, int acce
     indices[i] = static_cast<uint32_t>(values[i]);
   }
   return indices;
+}
+
+absl::StatusOr<Elements> GatherElements(const Source& source, int accessor, std::span<const uint32_t> which) {
+  return AccessorReader(source, accessor).Gather(which);
 }
 
 }  // namespace bakewell::gltf

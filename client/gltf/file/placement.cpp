@@ -39,47 +39,41 @@ absl::StatusOr<std::vector<double>> ReadAttribute(const Source& source, const js
   return values;
 }
 
-json Slice(const std::vector<double>& values, size_t instance, size_t components) {
-  const auto first = values.begin() + static_cast<std::ptrdiff_t>(instance * components);
-  return std::vector<double>(first, first + static_cast<std::ptrdiff_t>(components));
-}
-
-struct Attribute {
+struct AttributeName {
   const char* gpu_name;
   const char* node_name;
   int components;
 };
-constexpr Attribute kAttributes[] = {
+constexpr AttributeName kAttributes[] = {
     {"TRANSLATION", "translation", 3}, {"ROTATION", "rotation", 4}, {"SCALE", "scale", 3}};
 
-absl::Status CheckCount(const Source& source, const json& attributes, uint64_t max_instances) {
-  uint64_t count = 0;
-  for (const Attribute& attribute : kAttributes) {
-    const auto it = attributes.find(attribute.gpu_name);
-    if (it == attributes.end()) continue;
-    const uint64_t has = source.model.accessors[it->get<size_t>()].count;
-    if (count != 0 && has != count) return absl::InvalidArgumentError("its instance attributes differ in length");
-    count = has;
-  }
-  if (count == 0) return absl::InvalidArgumentError("EXT_mesh_gpu_instancing has no TRANSLATION, ROTATION or SCALE");
-  if (count > max_instances) {
-    return absl::InvalidArgumentError(absl::StrCat(count, " instances, at most ", max_instances, " are read"));
-  }
-  return absl::OkStatus();
+const json* InstancingOf(const Source& source, int node) {
+  return Find(NodeJson(source, node), {"extensions", "EXT_mesh_gpu_instancing", "attributes"});
 }
 
-absl::StatusOr<Instances> FromAttributes(const Source& source, const json& attributes, uint64_t max_instances) {
-  BAKEWELL_RETURN_IF_ERROR(CheckCount(source, attributes, max_instances));
+// The length of the first attribute that is there; 0 where none is.
+uint64_t CountOf(const Source& source, const json& attributes) {
+  for (const AttributeName& attribute : kAttributes) {
+    const auto it = attributes.find(attribute.gpu_name);
+    if (it != attributes.end()) return source.model.accessors[it->get<size_t>()].count;
+  }
+  return 0;
+}
+
+absl::StatusOr<Instances> FromAttributes(const Source& source, const json& attributes) {
   Instances instances;
   instances.present = true;
+  const uint64_t count = CountOf(source, attributes);
+  if (count == 0) return absl::InvalidArgumentError("EXT_mesh_gpu_instancing has no TRANSLATION, ROTATION or SCALE");
   for (const auto& [gpu_name, node_name, components] : kAttributes) {
-    BAKEWELL_ASSIGN_OR_RETURN(const auto values, ReadAttribute(source, attributes, gpu_name, components));
+    BAKEWELL_ASSIGN_OR_RETURN(std::vector<double> values, ReadAttribute(source, attributes, gpu_name, components));
     const auto width = static_cast<size_t>(components);
-    if (!values.empty()) instances.trs.resize(values.size() / width, json::object());
-    for (size_t i = 0; i < values.size() / width; ++i) instances.trs[i][node_name] = Slice(values, i, width);
+    if (values.empty()) continue;
+    if (values.size() != count * width) return absl::InvalidArgumentError("its instance attributes differ in length");
+    instances.attributes.push_back({node_name, width, std::move(values)});
   }
-  for (const json& trs : instances.trs) {
-    BAKEWELL_ASSIGN_OR_RETURN(const Transform transform, LocalTransform(trs));
+  for (size_t i = 0; i < count; ++i) {
+    BAKEWELL_ASSIGN_OR_RETURN(const Transform transform, LocalTransform(NodeOfInstance(instances, i)));
     instances.node_from_instance.push_back(transform);
   }
   return instances;
@@ -120,12 +114,26 @@ absl::StatusOr<std::vector<PlacedNode>> PlaceNodes(const Source& source) {
   return placed;
 }
 
-absl::StatusOr<Instances> ReadInstances(const Source& source, int node, uint64_t max_instances) {
-  const json* attributes = Find(NodeJson(source, node), {"extensions", "EXT_mesh_gpu_instancing", "attributes"});
+uint64_t InstanceCount(const Source& source, int node) {
+  const json* attributes = InstancingOf(source, node);
+  return attributes ? CountOf(source, *attributes) : 1;
+}
+
+absl::StatusOr<Instances> ReadInstances(const Source& source, int node) {
+  const json* attributes = InstancingOf(source, node);
   if (!attributes) return Instances{};
-  auto instances = FromAttributes(source, *attributes, max_instances);
+  auto instances = FromAttributes(source, *attributes);
   if (!instances.ok()) return ErrorAt(source, node, instances.status().message());
   return instances;
+}
+
+json NodeOfInstance(const Instances& instances, size_t instance) {
+  json node = json::object();
+  for (const Instances::Attribute& attribute : instances.attributes) {
+    const auto first = attribute.values.begin() + static_cast<std::ptrdiff_t>(instance * attribute.width);
+    node[attribute.name] = std::vector<double>(first, first + static_cast<std::ptrdiff_t>(attribute.width));
+  }
+  return node;
 }
 
 }  // namespace bakewell::gltf

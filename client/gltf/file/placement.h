@@ -22,12 +22,24 @@ absl::StatusOr<std::vector<PlacedNode>> PlaceNodes(const Source& source);
 
 // EXT_mesh_gpu_instancing of a node.
 struct Instances {
+  // One of translation, rotation, scale: `width` numbers per instance.
+  struct Attribute {
+    const char* name = "";
+    size_t width = 0;
+    std::vector<double> values;
+  };
   bool present = false;
-  std::vector<nlohmann::json> trs;  // per instance, the members of a node that has its transform
+  std::vector<Attribute> attributes;
   std::vector<Transform> node_from_instance;
 };
 
-// kInvalidArgument for attributes of different length or type, and for more than `max_instances`.
-absl::StatusOr<Instances> ReadInstances(const Source& source, int node, uint64_t max_instances);
+// How often a node's mesh is there: 1 without the extension. Reads no accessor.
+uint64_t InstanceCount(const Source& source, int node);
+
+// kInvalidArgument for attributes of different length or type, or that are not finite.
+absl::StatusOr<Instances> ReadInstances(const Source& source, int node);
+
+// The members (translation, rotation, scale) of a node that is where an instance is.
+nlohmann::json NodeOfInstance(const Instances& instances, size_t instance);
 
 }  // namespace bakewell::gltf

@@ -150,9 +150,7 @@ std::vector<std::string_view> SplitPath(std::string_view path) {
 // Follows one rule's path through the document.
 class Walker {
  public:
-  Walker(const json& document, const Rule& rule) : document_(document), rule_(rule) {
-    parts_ = SplitPath(rule.path);
-  }
+  Walker(const json& document, const Rule& rule) : document_(document), rule_(rule) { parts_ = SplitPath(rule.path); }
   absl::Status Walk() { return Visit(document_, 0, ""); }
 
  private:
@@ -184,7 +182,8 @@ class Walker {
     const bool each = name.ends_with("[]");
     if (each) name.remove_suffix(2);
     const auto member = value.find(name);
-    if (member == value.end()) return required ? Error(where, absl::StrCat(std::string(name), " is missing")) : absl::OkStatus();
+    if (member == value.end())
+      return required ? Error(where, absl::StrCat(std::string(name), " is missing")) : absl::OkStatus();
     // Extras may be anything; only objects can hold what is looked for.
     if (name == "extras" && !member->is_object()) return absl::OkStatus();
     return each ? VisitElements(*member, part, Join(where, name)) : Visit(*member, part + 1, Join(where, name));

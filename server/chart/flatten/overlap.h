@@ -1,17 +1,21 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
+#include <vector>
 
-#include "core/math/vec.h"
+#include "server/chart/flatten/flat_chart.h"
 
 namespace bakewell::chart {
 
-// Whether a border crosses itself: segments between uv[edge[0]] and uv[edge[1]] that meet in a point inside both.
-// Segments that only touch do not cross. For a connected chart whose faces all have positive area in the plane, an
-// outline that does not cross itself and has exactly one outer loop means that no two faces overlap.
-// Expected O(m log m) for m edges of similar length.
-bool OutlineCrossesItself(std::span<const Vec2d> uv, std::span<const std::array<uint32_t, 2>> edge);
+// What keeps a chart from covering every point of the plane at most once.
+struct Conflicts {
+  bool wrong_loops = false;    // its border is not one outer loop and holes: only cutting it up helps
+  std::vector<uint32_t> face;  // 0 .. n-1, faces without which it may be free of conflicts; may repeat
+  bool None() const { return !wrong_loops && face.empty(); }
+};
+
+// Flipped faces, vertices that are surrounded more than once, border edges that cross (edges that only touch do not).
+// No conflicts: no two faces of the chart overlap. Expected O(m log m + n) for m border edges of similar length.
+Conflicts FindConflicts(const Surface& surface, const FlatChart& chart);
 
 }  // namespace bakewell::chart

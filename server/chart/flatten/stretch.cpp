@@ -5,15 +5,6 @@
 namespace bakewell::chart {
 namespace {
 
-// A face thinner than this share of its longest edge squared flips by rounding alone.
-constexpr double kFlatShare = 1e-14;
-
-bool IsPositive(const FlatChart& chart, size_t i) {
-  const auto& [a, b, c] = chart.corner[i];
-  const Vec2d u = chart.uv[b] - chart.uv[a], v = chart.uv[c] - chart.uv[a];
-  return Cross(u, v) > kFlatShare * (u.x * u.x + u.y * u.y + v.x * v.x + v.y * v.y);
-}
-
 // (sigma1^2 + sigma2^2) of the affine map from the plane to space, from edge vectors: the squared Frobenius norm.
 double SquaredStretch(const Surface& surface, const FlatChart& chart, size_t i) {
   const auto& [a, b, c] = chart.corner[i];
@@ -30,7 +21,7 @@ double SquaredStretch(const Surface& surface, const FlatChart& chart, size_t i) 
 Stretch MeasureStretch(const Surface& surface, const FlatChart& chart) {
   double area_space = 0, area_plane = 0, sum = 0;
   for (size_t i = 0; i < chart.face.size(); ++i) {
-    if (!IsPositive(chart, i)) return {.flipped = true, .l2 = INFINITY};
+    if (IsFlipped(chart, i)) return {.flipped = true, .l2 = INFINITY};
     area_space += surface.area[chart.face[i]];
     area_plane += SignedArea2(chart, i) / 2;
     sum += surface.area[chart.face[i]] * SquaredStretch(surface, chart, i) / 2;

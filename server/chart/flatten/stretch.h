@@ -4,8 +4,8 @@
 
 namespace bakewell::chart {
 
-// How a chart's map from the plane to space stretches (Sander, Snyder, Gortler & Hoppe 2001, "Texture Mapping Progressive
-// Meshes", section 3), after scaling to equal area.
+// How a chart's map from the plane to space stretches (Sander, Snyder, Gortler & Hoppe 2001, "Texture Mapping
+// Progressive Meshes", section 3), after scaling to equal area.
 struct Stretch {
   bool flipped = false;  // some face has no positive area in the plane
   double l2 = 1;         // sqrt(area-weighted mean of (sigma1^2 + sigma2^2) / 2); 1 is an isometry

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -30,14 +32,34 @@ class Bitmap {
   uint64_t* Row(int y) { return words_.data() + static_cast<size_t>(y) * stride_; }
   const uint64_t* Row(int y) const { return words_.data() + static_cast<size_t>(y) * stride_; }
   int stride() const { return stride_; }
+  // Calls visit(y, begin, end) for every longest run of set cells, row by row.
+  template <typename Visit>
+  void ForEachRun(const Visit& visit) const {
+    for (int y = 0; y < height_; ++y)
+      for (int x = Next(y, 0, true); x < width_;) {
+        const int end = Next(y, x, false);
+        visit(y, x, end);
+        x = Next(y, end, true);
+      }
+  }
   // Number of set cells.
   int64_t Count() const {
     int64_t count = 0;
-    for (const uint64_t word : words_) count += __builtin_popcountll(word);
+    for (const uint64_t word : words_) count += std::popcount(word);
     return count;
   }
 
  private:
+  // The first cell at or after x that is (not) set; the width if there is none.
+  int Next(int y, int x, bool set) const {
+    for (int w = x / 64; w < stride_; ++w) {
+      uint64_t word = set ? Row(y)[w] : ~Row(y)[w];
+      if (w == x / 64) word &= ~uint64_t{0} << (x % 64);
+      if (word != 0) return std::min(width_, 64 * w + std::countr_zero(word));
+    }
+    return width_;
+  }
+
   int width_ = 0, height_ = 0, stride_ = 0;
   std::vector<uint64_t> words_;
 };

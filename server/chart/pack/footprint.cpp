@@ -56,8 +56,7 @@ void FillInside(Bitmap& bitmap, std::span<const Segment2> outline) {
 
 Bitmap RasterizeCover(std::span<const Segment2> outline) {
   Vec2d high{0, 0};
-  for (const auto& [a, b] : outline)
-    high = {std::max({high.x, a.x, b.x}), std::max({high.y, a.y, b.y})};
+  for (const auto& [a, b] : outline) high = {std::max({high.x, a.x, b.x}), std::max({high.y, a.y, b.y})};
   Bitmap bitmap(std::max(EndTouched(high.x), 1), std::max(EndTouched(high.y), 1));
   for (const auto& [a, b] : outline) TraceSegment(bitmap, a, b);
   FillInside(bitmap, outline);
@@ -67,9 +66,7 @@ Bitmap RasterizeCover(std::span<const Segment2> outline) {
 
 Bitmap Dilate(const Bitmap& bitmap, int radius) {
   Bitmap wide(bitmap.width() + 2 * radius, bitmap.height());
-  for (int y = 0; y < bitmap.height(); ++y)
-    for (int x = 0; x < bitmap.width(); ++x)
-      if (bitmap.Get(x, y)) wide.SetRange(y, x, x + 2 * radius + 1);
+  bitmap.ForEachRun([&](int y, int begin, int end) { wide.SetRange(y, begin, end + 2 * radius); });
   Bitmap result(wide.width(), bitmap.height() + 2 * radius);
   for (int y = 0; y < result.height(); ++y)
     for (int from = std::max(0, y - 2 * radius); from <= std::min(y, wide.height() - 1); ++from)
@@ -79,17 +76,17 @@ Bitmap Dilate(const Bitmap& bitmap, int radius) {
 
 Bitmap ToBlocks(const Bitmap& bitmap, int size, int shift_x, int shift_y) {
   Bitmap blocks((bitmap.width() + shift_x + size - 1) / size, (bitmap.height() + shift_y + size - 1) / size);
-  for (int y = 0; y < bitmap.height(); ++y)
-    for (int x = 0; x < bitmap.width(); ++x)
-      if (bitmap.Get(x, y)) blocks.Set((x + shift_x) / size, (y + shift_y) / size);
+  bitmap.ForEachRun([&](int y, int begin, int end) {
+    blocks.SetRange((y + shift_y) / size, (begin + shift_x) / size, (end - 1 + shift_x) / size + 1);
+  });
   return blocks;
 }
 
 Bitmap TurnQuarter(const Bitmap& bitmap) {
   Bitmap turned(bitmap.height(), bitmap.width());
-  for (int y = 0; y < bitmap.height(); ++y)
-    for (int x = 0; x < bitmap.width(); ++x)
-      if (bitmap.Get(x, y)) turned.Set(bitmap.height() - 1 - y, x);
+  bitmap.ForEachRun([&](int y, int begin, int end) {
+    for (int x = begin; x < end; ++x) turned.Set(bitmap.height() - 1 - y, x);
+  });
   return turned;
 }
 

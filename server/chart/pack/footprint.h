@@ -11,9 +11,9 @@ namespace bakewell::chart {
 
 using Segment2 = std::array<Vec2d, 2>;
 
-// Every texel that a region touches, by more than 1/128 of its side: texels that the outline runs through, and those whose centre
-// lies inside (even-odd). outline: the region's border in texels, all coordinates >= 0, in any order. The bitmap is
-// just large enough for the outline; at least one texel is set. O(length + area / 64).
+// Every texel that a region touches, by more than 1/128 of its side: texels that the outline runs through, and those
+// whose centre lies inside (even-odd). outline: the region's border in texels, all coordinates >= 0, in any order. The
+// bitmap is just large enough for the outline; at least one texel is set. O(length + area / 64).
 Bitmap RasterizeCover(std::span<const Segment2> outline);
 
 // Cells within `radius` (Chebyshev) of a set cell; the result is 2 * radius larger and its origin -radius.

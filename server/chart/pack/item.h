@@ -18,11 +18,13 @@ struct PackItem {
   bool rectangle = false;  // its outline is its bounding box
 };
 
-// From input units to texels on a page: scale, turn, then move. The turn is about the footprint's corner:
-// one quarter takes (x, y) to (turn_height - y, x).
+// From input units to texels on a page: tilt, scale, quarter turns, move. A quarter turn is about the footprint's
+// corner and takes (x, y) to (height - y, x).
 struct Placement {
   int page = 0;
-  Vec2d scale{1, 1};   // texels per input unit along the chart's own axes
+  Vec2d axis{1, 0};    // unit, the chart's direction that becomes x
+  Vec2d low{0, 0};     // input units, least coordinates after the tilt
+  Vec2d scale{1, 1};   // texels per input unit along the tilted axes
   Vec2d offset{0, 0};  // texels, before the turn
   int quarters = 0;
   Vec2d footprint{0, 0};  // texels, width and height before the turn, whole numbers
@@ -31,18 +33,25 @@ struct Placement {
 
 Vec2d ToPage(const Placement& placement, Vec2d p);
 
-// A chart at one density: its shapes for 0 to 3 quarter turns, and how its texels relate to its own plane.
-struct Candidate {
-  std::vector<Shape> turns;
-  Placement placement;  // scale, offset and footprint are set
-  int64_t cells = 0;
+// One way to lay a chart down.
+struct Pose {
+  Shape shape;
+  Placement placement;  // all but page and corner
 };
 
-// cell: 1, or 4 where no two charts may share a 4x4 block. max_size: texels, longer charts are scaled down.
+// A chart at one density.
+struct Candidate {
+  std::vector<Pose> poses;
+  int64_t cells = 0;  // of the first pose
+};
+
 struct Raster {
   double texels_per_unit = 1;
-  int cell = 1, gutter = 2, max_size = 1024;
-  bool turn = true;
+  int cell = 1;         // 4: no two charts may share a 4x4 block
+  int gutter = 2;       // empty texels between charts
+  int max_size = 1024;  // texels; longer charts are scaled down
+  bool turn = true;     // quarter turns
+  int tilts = 1;        // directions within a quarter turn for charts that are not rectangles
 };
 
 Candidate MakeCandidate(const PackItem& item, const Raster& raster);

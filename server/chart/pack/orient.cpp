@@ -91,4 +91,15 @@ Vec2d LeastRectangleAxis(std::span<const Segment2> outline) {
   return best;
 }
 
+Vec2d SizeAlong(std::span<const Segment2> outline, Vec2d axis) {
+  Vec2d low{INFINITY, INFINITY}, high{-INFINITY, -INFINITY};
+  for (const Segment2& segment : outline)
+    for (const Vec2d p : segment) {
+      const Vec2d q{Along(p, axis), Cross(axis, p)};
+      low = {std::min(low.x, q.x), std::min(low.y, q.y)};
+      high = {std::max(high.x, q.x), std::max(high.y, q.y)};
+    }
+  return outline.empty() ? Vec2d{0, 0} : high - low;
+}
+
 }  // namespace bakewell::chart

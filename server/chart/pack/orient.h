@@ -11,4 +11,7 @@ namespace bakewell::chart {
 // edges; (1, 0) for an outline without extent. O(m log m).
 Vec2d LeastRectangleAxis(std::span<const Segment2> outline);
 
+// Extents of an outline along a unit direction and across it.
+Vec2d SizeAlong(std::span<const Segment2> outline, Vec2d axis);
+
 }  // namespace bakewell::chart

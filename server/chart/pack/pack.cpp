@@ -4,23 +4,44 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numeric>
+#include <optional>
 
 #include "core/base/check.h"
+#include "server/chart/pack/density.h"
+#include "server/chart/pack/packer.h"
 
 namespace bakewell::chart {
 namespace {
 
 constexpr int kBlock = 4;
 constexpr int kDefaultSide = 1024;
-constexpr int kTrials = 6, kBruteForceTrials = 24, kMaxTrials = 40;
 constexpr int kMaxSide = 32768;
+constexpr int kMaxTrials = 40;
+constexpr int kSketchSide = 256;  // cells of the coarse pages on which plans are compared
 
-// Page limits in cells.
-struct Grid {
-  int width, height, cell;
-  int max_pages;
+// How hard to look.
+struct Effort {
+  int trials;     // densities
+  int plans;      // orders and page shapes that are sketched, for few charts
+  int finalists;  // of them, those that get a density search
+  int tilts;
+};
+constexpr Effort kNormalEffort{6, 108, 2, 2}, kBruteEffort{16, 432, 6, 4};
+
+struct Plan {
+  Order order;
+  double aspect = 1;  // page width / height
+};
+
+struct Outcome {
+  Trial trial;
+  Grid grid{0, 0, 1};
+  Raster raster;
+  // Density for the page area used; a page of a given shape counts whole.
+  double Score(bool free_shape) const {
+    const double area = double(grid.width) * (free_shape ? trial.used_height : grid.height);
+    return raster.texels_per_unit / std::sqrt(area);
+  }
 };
 
 std::vector<Candidate> MakeCandidates(std::span<const PackItem> items, const Raster& raster) {
@@ -29,172 +50,68 @@ std::vector<Candidate> MakeCandidates(std::span<const PackItem> items, const Ras
   return candidates;
 }
 
-// Large and long charts first; ties by number.
-std::vector<uint32_t> PlacingOrder(const std::vector<Candidate>& candidates) {
-  std::vector<uint32_t> order(candidates.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const auto rank = [&](uint32_t i) {
-    const Shape& shape = candidates[i].turns[0];
-    return candidates[i].cells + int64_t{std::max(shape.width, shape.height)} * std::max(shape.width, shape.height) / 4;
-  };
-  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return rank(a) > rank(b); });
-  return order;
+int RoundUp(int value, int step) { return (value + step - 1) / step * step; }
+
+Grid GridOf(double texels, double aspect, int cell) {
+  const double width = std::sqrt(texels * aspect);
+  const int cells = std::max(1, static_cast<int>(std::lround(width / kBlock)) * kBlock / cell);
+  return {cells, static_cast<int>(texels / (double(cells) * cell * cell)), 1};
 }
 
-// Remembers how far down a page shapes of a size have been tried: the next of the same size begins there.
-class SearchStart {
- public:
-  int Of(const Shape& shape, int page) const {
-    const auto it = row_.find(Key(shape, page));
-    return it == row_.end() ? 0 : std::max(0, it->second - shape.height / 2);
+// Orders by size, by length, and keyed variations of both; page shapes from square to 2 : 3 where they are free.
+std::vector<Plan> MakePlans(int count, bool free_shape) {
+  std::vector<Plan> plans;
+  for (int i = 0; i < count; ++i) {
+    Plan plan;
+    plan.order.long_weight = i % 3 == 0 ? 0.25 : i % 3 == 1 ? 1.0 : 0.0;
+    plan.order.height_weight = i / 3 % 2 == 0 ? 1.0 : 0.5;
+    plan.order.jitter = i < 54 ? 0 : 0.35;
+    plan.order.seed = static_cast<uint32_t>(i);
+    if (free_shape) plan.aspect = std::exp2((i / 6 % 9 - 4) * 0.11);
+    plans.push_back(plan);
   }
-  void Set(const Shape& shape, int page, int row) { row_[Key(shape, page)] = row; }
-
- private:
-  // Sizes are classed in steps of an eighth of an octave.
-  static int ClassOf(int size) { return size <= 8 ? size : static_cast<int>(8 * std::log2(size)); }
-  static std::array<int, 3> Key(const Shape& shape, int page) {
-    return {page, ClassOf(shape.width), ClassOf(shape.height)};
-  }
-  std::map<std::array<int, 3>, int> row_;
-};
-
-// One attempt to place everything.
-struct Trial {
-  bool complete = true;
-  int used_height = 0;  // cells, of the fullest page
-  int used_width = 0;
-  int pages = 1;
-  std::vector<Placement> placement;
-  std::vector<int64_t> cells;  // per page
-};
-
-class Packer {
- public:
-  Packer(const Grid& grid, const std::vector<Candidate>& candidates) : grid_(grid), candidates_(candidates) {}
-
-  Trial Run() && {
-    trial_.placement.resize(candidates_.size());
-    for (const uint32_t i : PlacingOrder(candidates_)) {
-      if (Place(i)) continue;
-      trial_.complete = false;
-      break;
-    }
-    trial_.pages = static_cast<int>(pages_.size());
-    return std::move(trial_);
-  }
-
- private:
-  struct Choice {
-    int turn = -1;
-    Spot spot{0, 0};
-    int top = 0;
-  };
-
-  bool Place(uint32_t i) {
-    for (int page = 0; page < grid_.max_pages; ++page) {
-      if (page == static_cast<int>(pages_.size())) {
-        pages_.emplace_back(grid_.width, grid_.height);
-        trial_.cells.push_back(0);
-      }
-      const Choice choice = Choose(candidates_[i], page);
-      if (choice.turn < 0) continue;
-      Commit(i, page, choice);
-      return true;
-    }
-    return false;
-  }
-
-  // The turn that reaches least far down.
-  Choice Choose(const Candidate& candidate, int page) {
-    Choice best;
-    int limit = grid_.height;
-    for (int turn = 0; turn < static_cast<int>(candidate.turns.size()); ++turn) {
-      const Shape& shape = candidate.turns[turn];
-      const auto spot = pages_[page].FindLowest(shape, start_.Of(shape, page), limit);
-      start_.Set(shape, page, spot ? spot->y : std::max(start_.Of(shape, page), limit - shape.height));
-      if (!spot) continue;
-      best = {turn, *spot, spot->y + shape.height};
-      limit = best.top - 1;
-    }
-    return best;
-  }
-
-  void Commit(uint32_t i, int page, const Choice& choice) {
-    const Shape& shape = candidates_[i].turns[choice.turn];
-    pages_[page].Place(shape, choice.spot);
-    Placement& placement = trial_.placement[i];
-    placement = candidates_[i].placement;
-    placement.page = page;
-    placement.quarters = choice.turn;
-    placement.corner = {double(choice.spot.x * grid_.cell), double(choice.spot.y * grid_.cell)};
-    trial_.used_height = std::max(trial_.used_height, choice.top);
-    trial_.used_width = std::max(trial_.used_width, choice.spot.x + shape.width);
-    trial_.cells[page] += candidates_[i].cells;
-  }
-
-  Grid grid_;
-  const std::vector<Candidate>& candidates_;
-  std::vector<Page> pages_;
-  SearchStart start_;
-  Trial trial_;
-};
-
-struct Outcome {
-  Trial trial;
-  Raster raster;
-  bool found = false;
-};
-
-Trial Attempt(std::span<const PackItem> items, const Raster& raster, const Grid& grid) {
-  return Packer(grid, MakeCandidates(items, raster)).Run();
+  return plans;
 }
 
-// Texels that an item takes at a density, with half its gutter.
-double Demand(const PackItem& item, double density, double gutter) {
-  const double scale = density * item.density;
-  return item.area * scale * scale + (item.size.x + item.size.y) * scale * (1 + gutter) + (1 + gutter) * (1 + gutter);
+// Packs every plan at one coarse density and sorts them by the page area they use.
+std::vector<Plan> RankPlans(std::span<const PackItem> items, std::vector<Plan> plans, Raster raster, double texels) {
+  const double shrink = kSketchSide / std::sqrt(texels);
+  raster.texels_per_unit =
+      std::min(EstimateDensity(items, raster.gutter, 0.85 * texels), LargestUnclampedDensity(items, raster)) * shrink;
+  raster.cell = 1;
+  raster.gutter = 0;
+  const std::vector<Candidate> candidates = MakeCandidates(items, raster);
+  std::vector<double> area(plans.size());
+  tbb::parallel_for(size_t{0}, plans.size(), [&](size_t i) {
+    Grid grid = GridOf(kSketchSide * kSketchSide, plans[i].aspect, 1);
+    grid.height *= 3;
+    const Trial trial = PlaceAll(grid, candidates, plans[i].order);
+    area[i] = trial.complete ? double(trial.used_height) * grid.width : INFINITY;
+  });
+  std::vector<size_t> order(plans.size());
+  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return area[a] < area[b]; });
+  std::vector<Plan> ranked;
+  for (const size_t i : order) ranked.push_back(plans[i]);
+  return ranked;
 }
 
-// The density at which the items' demand is `texels`, by bisection on its logarithm.
-double EstimateDensity(std::span<const PackItem> items, double gutter, double texels) {
-  double area = 0;
-  for (const PackItem& item : items) area += item.area * item.density * item.density;
-  double high = std::log(std::sqrt(texels / area)), low = high - 20;
-  for (int i = 0; i < 40; ++i) {
-    const double middle = (low + high) / 2, density = std::exp(middle);
-    double demand = 0;
-    for (const PackItem& item : items) demand += Demand(item, density, gutter);
-    (demand > texels ? high : low) = middle;
-  }
-  return std::exp(low);
-}
-
-// Above it some chart would be longer than the page.
-double LargestUnclampedDensity(std::span<const PackItem> items, const Raster& raster) {
-  double longest = 0;
-  for (const PackItem& item : items) longest = std::max(longest, std::max(item.size.x, item.size.y) * item.density);
-  return (raster.max_size - 0.5) / longest;
-}
-
-Grid GridFor(int side_x, int side_y, int cell) { return {side_x / cell, side_y / cell, cell, 1}; }
-
-// The largest density that fits one page of the grid: a page twice as high tells by how much a trial misses.
-Outcome SearchDensity(std::span<const PackItem> items, Raster raster, const Grid& page, int trials) {
-  Grid tall = page;
-  tall.height = 2 * page.height;
-  const double texels = double(page.width) * page.cell * page.height * page.cell;
-  double low = 0, high = INFINITY, density = EstimateDensity(items, raster.gutter, 0.9 * texels);
+// The largest density that fits one page: a page twice as high tells by how much a trial misses.
+std::optional<Outcome> SearchDensity(std::span<const PackItem> items, Raster raster, const Grid& page, const Plan& plan,
+                                     int trials) {
+  const Grid tall{page.width, 2 * page.height, 1};
+  const double texels = double(page.width) * page.height * raster.cell * raster.cell;
   const double cap = LargestUnclampedDensity(items, raster);
-  Outcome best;
-  for (int i = 0; i < trials || (!best.found && i < kMaxTrials); ++i) {
+  double low = 0, high = INFINITY, density = EstimateDensity(items, raster.gutter, 0.9 * texels);
+  std::optional<Outcome> best;
+  for (int i = 0; i < trials || (!best && i < kMaxTrials); ++i) {
     density = std::min(density, cap);
     raster.texels_per_unit = density;
-    Trial trial = Attempt(items, raster, tall);
+    Trial trial = PlaceAll(tall, MakeCandidates(items, raster), plan.order);
     const double used = trial.complete ? trial.used_height : 2.0 * page.height;
     const bool fits = trial.complete && trial.used_height <= page.height;
     (fits ? low : high) = density;
-    if (fits) best = {std::move(trial), raster, true};
+    if (fits) best = Outcome{std::move(trial), page, raster};
     if (fits && density == cap) break;
     density *= std::sqrt(page.height / used) * (fits ? 1.001 : 0.999);
     if (density <= low || density >= high) density = low > 0 ? low + (high - low) * 0.5 : high * 0.7;
@@ -203,62 +120,97 @@ Outcome SearchDensity(std::span<const PackItem> items, Raster raster, const Grid
   return best;
 }
 
-int RoundUp(int value, int step) { return (value + step - 1) / step * step; }
+// Few charts: the order and the page's shape decide, so many are sketched. Many charts fill any page well.
+std::optional<Outcome> SearchPlans(std::span<const PackItem> items, Raster raster, double texels, bool free_shape,
+                                   const Effort& effort) {
+  const int affordable = static_cast<int>(size_t(effort.plans) * 64 / std::max<size_t>(items.size(), 64));
+  raster.tilts = affordable > 1 ? effort.tilts : 1;
+  std::vector<Plan> plans = MakePlans(std::max(affordable, 1), free_shape && affordable > 1);
+  if (plans.size() > 1) plans = RankPlans(items, std::move(plans), raster, texels);
+  plans.resize(std::min<size_t>(plans.size(), effort.finalists));
+  std::optional<Outcome> best;
+  for (const Plan& plan : plans) {
+    auto outcome = SearchDensity(items, raster, GridOf(texels, plan.aspect, raster.cell), plan, effort.trials);
+    if (outcome && (!best || outcome->Score(free_shape) > best->Score(free_shape))) best = std::move(outcome);
+  }
+  return best;
+}
 
 PackResult ToResult(Outcome outcome, int width, int height) {
-  PackResult result{width, height, outcome.trial.pages, outcome.raster.texels_per_unit,
-                    std::move(outcome.trial.placement), {}};
-  const double all = double(width) * height / (outcome.raster.cell * outcome.raster.cell);
+  const int cell = outcome.raster.cell;
+  PackResult result{width,
+                    height,
+                    static_cast<int>(outcome.trial.cells.size()),
+                    outcome.raster.texels_per_unit,
+                    std::move(outcome.trial.placement),
+                    {}};
+  for (Placement& placement : result.placement) placement.corner = placement.corner * double(cell);
+  const double all = double(width) * height / (cell * cell);
   for (const int64_t cells : outcome.trial.cells) result.utilization.push_back(double(cells) / all);
   return result;
 }
 
-// Given density: pages of the given side, or one page as large as need be.
-PackResult PackAtDensity(std::span<const PackItem> items, const PackOptions& options, Raster raster) {
-  raster.texels_per_unit = options.texelsPerUnit;
-  if (options.resolution > 0) {
-    Grid grid = GridFor(options.resolution, options.resolution, raster.cell);
-    grid.max_pages = static_cast<int>(items.size());
-    Trial trial = Attempt(items, raster, grid);
-    return ToResult({std::move(trial), raster, true}, grid.width * grid.cell, grid.height * grid.cell);
-  }
+// Given density and side: as many pages as it takes.
+PackResult PackPages(std::span<const PackItem> items, const Raster& raster, int side) {
+  const Grid grid{side / raster.cell, side / raster.cell, static_cast<int>(items.size())};
+  Trial trial = PlaceAll(grid, MakeCandidates(items, raster), {});
+  return ToResult({std::move(trial), grid, raster}, grid.width * raster.cell, grid.height * raster.cell);
+}
+
+// Given density, free side: one page as large as need be.
+PackResult PackOnePage(std::span<const PackItem> items, const Raster& raster) {
   double demand = 0, longest = 1;
   for (const PackItem& item : items) {
-    demand += Demand(item, options.texelsPerUnit, raster.gutter);
-    longest = std::max(longest, std::max(item.size.x, item.size.y) * options.texelsPerUnit * item.density + 2 * kBlock);
+    demand += Demand(item, raster.texels_per_unit, raster.gutter);
+    longest =
+        std::max(longest, std::hypot(item.size.x, item.size.y) * raster.texels_per_unit * item.density + 2 * kBlock);
   }
-  const int side = std::min(RoundUp(static_cast<int>(std::max(std::sqrt(demand * 1.2), longest)), kBlock), kMaxSide);
-  Grid grid = GridFor(side, 2 * side, raster.cell);
-  grid.max_pages = static_cast<int>(items.size());
-  Trial trial = Attempt(items, raster, grid);
-  const int width = RoundUp(trial.used_width * raster.cell, kBlock);
-  const int height = RoundUp(trial.used_height * raster.cell, kBlock);
-  return ToResult({std::move(trial), raster, true}, width, height);
+  const double side = std::min<double>(kMaxSide, std::max(std::sqrt(demand * 1.1), longest));
+  const int width = RoundUp(static_cast<int>(side), kBlock) / raster.cell;
+  const Grid grid{width, 2 * width, static_cast<int>(items.size())};
+  Trial trial = PlaceAll(grid, MakeCandidates(items, raster), {});
+  const int used_width = RoundUp(trial.used_width * raster.cell, kBlock);
+  const int used_height = RoundUp(trial.used_height * raster.cell, kBlock);
+  return ToResult({std::move(trial), grid, raster}, used_width, used_height);
+}
+
+Raster RasterFor(const PackOptions& options, int side) {
+  Raster raster;
+  raster.texels_per_unit = options.texelsPerUnit;
+  raster.cell = options.blockAlign ? kBlock : 1;
+  raster.gutter = std::max<int>(static_cast<int>(options.padding), options.bilinear ? 2 : 0);
+  raster.turn = options.rotateCharts;
+  raster.max_size = options.maxChartSize > 0 ? static_cast<int>(options.maxChartSize) : kMaxSide;
+  // A chart as long as the page must still fit with its half gutter and its place in a block.
+  const int room = side / kBlock * kBlock - (options.blockAlign ? 2 * kBlock + raster.gutter : 0);
+  raster.max_size = std::min(raster.max_size, std::max(room, 1));
+  return raster;
 }
 
 }  // namespace
 
 PackResult Pack(std::span<const PackItem> items, const PackOptions& options) {
   BAKEWELL_CHECK(!items.empty());
-  const int side = options.resolution > 0 ? static_cast<int>(options.resolution) : kDefaultSide;
-  Raster raster;
-  raster.cell = options.blockAlign ? kBlock : 1;
-  raster.gutter = std::max<int>(static_cast<int>(options.padding), options.bilinear ? 2 : 0);
-  raster.turn = options.rotateCharts;
-  raster.max_size = options.maxChartSize > 0 ? static_cast<int>(options.maxChartSize) : kMaxSide;
-  const bool unlimited = options.resolution == 0 && options.texelsPerUnit > 0;
-  if (!unlimited) raster.max_size = std::min(raster.max_size, side / kBlock * kBlock - (raster.cell > 1 ? 2 * kBlock : 0));
-  if (options.texelsPerUnit > 0) return PackAtDensity(items, options, raster);
-  const Grid grid = GridFor(side, side, raster.cell);
-  Outcome best = SearchDensity(items, raster, grid, options.bruteForce ? kBruteForceTrials : kTrials);
-  if (best.found) return ToResult(std::move(best), grid.width * grid.cell, grid.height * grid.cell);
-  // More charts than a page has room for, however small: as many pages as they need.
+  const bool free_side = options.resolution == 0;
+  const int side = free_side ? kDefaultSide : static_cast<int>(options.resolution);
+  if (options.texelsPerUnit > 0)
+    return free_side ? PackOnePage(items, RasterFor(options, kMaxSide))
+                     : PackPages(items, RasterFor(options, side), side);
+
   const double texels = double(side) * side;
-  PackOptions pages = options;
-  pages.resolution = static_cast<uint32_t>(side);
-  pages.texelsPerUnit = static_cast<float>(
-      EstimateDensity(items, raster.gutter, 2 * std::max(texels, Demand({}, 0, raster.gutter) * double(items.size()))));
-  return PackAtDensity(items, pages, raster);
+  Raster raster = RasterFor(options, side);
+  std::optional<Outcome> best;
+  const double least = Demand({}, 0, raster.gutter) * double(items.size());
+  if (least < texels)
+    best = SearchPlans(items, raster, texels, free_side, options.bruteForce ? kBruteEffort : kNormalEffort);
+  if (!best) {
+    // More charts than a page has room for, however small: as many pages as they need.
+    raster.texels_per_unit = EstimateDensity(items, raster.gutter, 2 * std::max(texels, least));
+    return PackPages(items, raster, side);
+  }
+  const int width = best->grid.width * raster.cell;
+  const int height = free_side ? best->trial.used_height * raster.cell : best->grid.height * raster.cell;
+  return ToResult(*std::move(best), width, RoundUp(height, kBlock));
 }
 
 }  // namespace bakewell::chart

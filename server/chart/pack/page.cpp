@@ -13,14 +13,16 @@ int LevelFor(int length) { return std::bit_width(static_cast<unsigned>(length)) 
 
 std::vector<Run> RunsOf(const Bitmap& bitmap, int origin) {
   std::vector<Run> runs;
-  for (int y = 0; y < bitmap.height(); ++y)
-    for (int x = 0; x < bitmap.width(); ++x) {
-      if (!bitmap.Get(x, y)) continue;
-      const int begin = x;
-      while (x < bitmap.width() && bitmap.Get(x, y)) ++x;
-      runs.push_back({y + origin, begin + origin, x + origin});
-    }
+  bitmap.ForEachRun([&](int y, int begin, int end) { runs.push_back({y + origin, begin + origin, end + origin}); });
   return runs;
+}
+
+void FillRange(uint64_t* row, int begin, int end) {
+  while (begin < end) {
+    const int bit = begin % 64, count = std::min(64 - bit, end - begin);
+    row[begin / 64] |= (count == 64 ? ~uint64_t{0} : (uint64_t{1} << count) - 1) << bit;
+    begin += count;
+  }
 }
 
 // blocked[i] |= row shifted down by `shift` bits.
@@ -98,8 +100,7 @@ void Page::Place(const Shape& shape, Spot spot) {
     if (y < 0 || y >= height_) continue;
     if (raised >= 0 && raised != y) RaiseLevels(raised);
     raised = y;
-    const int begin = std::max(spot.x + run.begin, 0), end = std::min(spot.x + run.end, width_);
-    for (int x = begin; x < end; ++x) Row(0, y)[x / 64] |= uint64_t{1} << (x % 64);
+    FillRange(Row(0, y), std::max(spot.x + run.begin, 0), std::min(spot.x + run.end, width_));
   }
   if (raised >= 0) RaiseLevels(raised);
 }

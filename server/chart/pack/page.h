@@ -16,7 +16,7 @@ struct Run {
 // A shape to be placed: `test` must be free, `claim` is taken. Both as runs; claims may begin before 0 (a gutter).
 struct Shape {
   int width = 0, height = 0;
-  std::vector<Run> test;   // longest first
+  std::vector<Run> test;  // longest first
   std::vector<Run> claim;
 };
 
@@ -26,8 +26,8 @@ struct Spot {
   int x, y;
 };
 
-// One page of cells, and a search for the lowest free place that looks at 64 columns at once: level k of a row has bit x
-// set where any of the cells x .. x + 2^k - 1 is taken, so a run of any length is tested by two reads per word.
+// One page of cells, and a search for the lowest free place that looks at 64 columns at once: level k of a row has bit
+// x set where any of the cells x .. x + 2^k - 1 is taken, so a run of any length is tested by two reads per word.
 class Page {
  public:
   Page(int width, int height);

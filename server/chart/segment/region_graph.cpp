@@ -14,8 +14,7 @@ uint64_t PairKey(uint32_t a, uint32_t b) { return (uint64_t{std::min(a, b)} << 3
 
 }  // namespace
 
-LinkTable::LinkTable(size_t expected)
-    : key_(std::bit_ceil(2 * expected + 2), kEmpty), link_(key_.size(), kNone) {}
+LinkTable::LinkTable(size_t expected) : key_(std::bit_ceil(2 * expected + 2), kEmpty), link_(key_.size(), kNone) {}
 
 size_t LinkTable::SlotOf(uint64_t key) const {
   const size_t mask = key_.size() - 1;
@@ -95,6 +94,7 @@ std::vector<uint32_t> RegionGraph::Merge(uint32_t link) {
   if (links_of_[large].size() < links_of_[small].size()) std::swap(large, small);
   regions_[large].area_normal += regions_[small].area_normal;
   regions_[large].area += regions_[small].area;
+  regions_[large].faces += regions_[small].faces;
   regions_[large].outline = std::max(0.0, regions_[large].outline + regions_[small].outline - 2 * links_[link].length);
   parent_[small] = large;
   links_[link].alive = false;

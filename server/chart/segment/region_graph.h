@@ -13,20 +13,21 @@ struct Region {
   Vec3d area_normal{0, 0, 0};  // sum of area * normal
   double area = 0;
   double outline = 0;  // length of its border
+  uint32_t faces = 1;
 };
 
 // The border that two regions share.
 struct Link {
-  uint32_t a = 0, b = 0;   // regions
-  double length = 0;       // sum of edge lengths
-  double crease = 0;       // sum of length * (1 - cos of the dihedral angle)
-  double sharp = 0;        // sum of lengths of edges that turn by more than 30 degrees
+  uint32_t a = 0, b = 0;    // regions
+  double length = 0;        // sum of edge lengths
+  double crease = 0;        // sum of length * (1 - cos of the dihedral angle)
+  double sharp = 0;         // sum of lengths of edges that turn by more than 30 degrees
   double texture_seam = 0;  // sum of lengths that are seams of the input UVs
   bool alive = true;
 };
 
-// Open-addressing map from a pair of regions to their link. Keys are never erased: a region that has been merged away is
-// never asked for again.
+// Open-addressing map from a pair of regions to their link. Keys are never erased: a region that has been merged away
+// is never asked for again.
 class LinkTable {
  public:
   explicit LinkTable(size_t expected);

@@ -10,10 +10,14 @@ namespace {
 
 constexpr int kStepsPerCost = 512;
 constexpr int kMaxLevels = 8192;
-// Mean deviation 1 - |sum of area normals| / area at which the normal term counts 1: that of a spherical cap of 60
-// degrees, which still flattens to a Sander stretch of about 1.005.
-constexpr double kUnitDeviation = 0.25;
+// Mean deviation 1 - |sum of area normals| / area at which the normal term counts 1: that of a spherical cap of 77
+// degrees.
+constexpr double kUnitDeviation = 0.39;
+constexpr double kCreaseScale = 0.7, kRaggedScale = 0.12;
 constexpr float kAlwaysSeam = 1000;
+// Curved charts are solved for; sparse factorisation grows faster than n log n, so their size is bounded.
+constexpr uint32_t kMaxCurvedFaces = 16384;
+constexpr double kFlatDeviation = 1e-6;
 
 // The weighted cost of merging the two regions of a link; terms are ratios.
 class Cost {
@@ -32,12 +36,13 @@ class Cost {
     if (options_.normalSeamWeight >= kAlwaysSeam && link.sharp > 0) return INFINITY;
     if (options_.textureSeamWeight >= kAlwaysSeam && link.texture_seam > 0) return INFINITY;
     const double deviation = std::max(0.0, 1 - Length(a.area_normal + b.area_normal) / area) / kUnitDeviation;
+    if (a.faces + b.faces > kMaxCurvedFaces && deviation > kFlatDeviation) return INFINITY;
     const double roundness = outline > 0 ? 1 - std::min(1.0, 4 * kPi * area / (outline * outline)) : 1;
     const double shared = link.length / std::min(a.outline, b.outline);
     const double ragged = std::max(0.0, 0.25 - shared);
     return options_.normalDeviationWeight * deviation + options_.roundnessWeight * roundness +
-           options_.straightnessWeight * 0.1 * ragged * std::min(1.0, deviation) +
-           options_.normalSeamWeight * link.crease / link.length +
+           options_.straightnessWeight * kRaggedScale * ragged * std::min(1.0, deviation) +
+           options_.normalSeamWeight * kCreaseScale * link.crease / link.length +
            options_.textureSeamWeight * link.texture_seam / link.length;
   }
 

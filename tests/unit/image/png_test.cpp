@@ -56,7 +56,7 @@ TEST(Png, EveryTruncationIsAnErrorThatNamesTheFile) {
   ASSERT_TRUE(WritePng(folder / "a.png", 19, 11, Ramp(19, 11)).ok());
   const std::string bytes = ReadWholeFile(folder / "a.png").value();
   for (size_t size = 0; size < bytes.size(); ++size) {
-    ASSERT_TRUE(WriteFileAtomically(folder / "cut.png", std::string_view(bytes).substr(0, size)).ok());
+    WriteQuickly(folder / "cut.png", std::string_view(bytes).substr(0, size));
     const absl::StatusOr<Image> read = ReadPng(folder / "cut.png");
     ASSERT_EQ(read.status().code(), absl::StatusCode::kInvalidArgument) << size << " of " << bytes.size() << " bytes";
     ASSERT_NE(std::string(read.status().message()).find("cut.png"), std::string::npos);
@@ -70,7 +70,7 @@ TEST(Png, AFlippedByteIsAnErrorOrAnImageNeverACrash) {
   for (size_t i = 0; i < bytes.size(); ++i) {
     std::string hostile = bytes;
     hostile[i] = static_cast<char>(hostile[i] ^ 0xff);
-    ASSERT_TRUE(WriteFileAtomically(folder / "bad.png", hostile).ok());
+    WriteQuickly(folder / "bad.png", hostile);
     const absl::StatusOr<Image> read = ReadPng(folder / "bad.png");
     ASSERT_TRUE(read.ok() || read.status().code() == absl::StatusCode::kInvalidArgument) << read.status();
   }
