@@ -204,7 +204,8 @@ absl::StatusOr<v1::Job> FarmClient::Watch(int64_t job, const std::function<bool(
     const absl::Status status = WatchOnce(job, note, last);
     if (HasEnded(last)) return last;
     if (!WorthRetrying(status) || std::chrono::steady_clock::now() - heard > patience_) return status;
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    // Waits until the coordinator is there again; then the stream is opened anew.
+    BAKEWELL_RETURN_IF_ERROR(Get(job).status());
   }
 }
 

@@ -65,6 +65,8 @@ Connection::Connection(std::shared_ptr<grpc::Channel> channel, std::string token
 void Connection::Prepare(grpc::ClientContext& context, std::chrono::milliseconds timeout) const {
   PrepareStream(context);
   context.set_deadline(std::chrono::system_clock::now() + timeout);
+  // A connection is made only while a call waits for it (gRPC's own poll comes every five seconds).
+  context.set_wait_for_ready(true);
 }
 
 void Connection::PrepareStream(grpc::ClientContext& context) const {

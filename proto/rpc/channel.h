@@ -31,9 +31,9 @@ class Connection {
   Connection(std::shared_ptr<grpc::Channel> channel, std::string token);
 
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
-  // Gives a call its token and deadline.
+  // Gives a call its token and deadline; until then it waits for a coordinator that is not there.
   void Prepare(grpc::ClientContext& context, std::chrono::milliseconds timeout) const;
-  // Gives a call its token and no deadline: for streams that last.
+  // Gives a call its token and no deadline, for streams that last; without a connection it fails at once.
   void PrepareStream(grpc::ClientContext& context) const;
 
  private:

@@ -1,8 +1,7 @@
 // What /metrics and /status.json say.
 #include <absl/strings/str_cat.h>
 
-#include <nlohmann/json.hpp>
-
+#include "core/artifact/json_line.h"
 #include "server/http/dashboard.h"
 
 namespace bakewell::http {
@@ -15,38 +14,55 @@ void Metric(std::string& text, std::string_view name, std::string_view type, std
                   "\nbakewell_", n, " ", value, "\n");
 }
 
-nlohmann::json JsonOf(const job::JobView& view) {
+JsonLine JsonOf(const job::JobView& view) {
   const char* const states[] = {"running", "done", "failed", "cancelled"};
-  nlohmann::json job = {{"id", view.row.id},
-                        {"user", view.row.user},
-                        {"name", view.row.name},
-                        {"state", states[static_cast<int>(view.row.state)]},
-                        {"reason", view.row.state == store::JobState::kRunning ? "" : view.row.reason},
-                        {"priority", view.row.priority},
-                        {"submitted_us", view.row.submitted_us},
-                        {"finished_us", view.row.finished_us},
-                        {"tasks", view.row.tasks},
-                        {"done", view.tasks_done},
-                        {"known", view.row.known_tasks},
-                        {"run_us", view.row.run_us},
-                        {"left_low_us", view.left_low.count()},
-                        {"left_high_us", view.left_high.count()},
-                        {"phases", nlohmann::json::array()},
-                        {"previews", nlohmann::json::array()}};
+  std::vector<JsonLine> phases;
   for (const job::PhaseView& phase : view.phases) {
-    job["phases"].push_back({{"phase", phase.phase}, {"done", phase.done}, {"total", phase.total}});
+    phases.push_back(JsonLine().Add("phase", phase.phase).Add("done", phase.done).Add("total", phase.total));
   }
+  std::vector<std::string> previews;
   for (const TaskOutput& artifact : view.artifacts) {
-    if (artifact.name.ends_with(".png")) job["previews"].push_back(artifact.name);
+    if (artifact.name.ends_with(".png")) previews.push_back(artifact.name);
   }
-  return job;
+  const bool running = view.row.state == store::JobState::kRunning;
+  return JsonLine()
+      .Add("id", view.row.id)
+      .Add("user", view.row.user)
+      .Add("name", view.row.name)
+      .Add("state", states[static_cast<int>(view.row.state)])
+      .Add("reason", running ? "" : view.row.reason)
+      .Add("priority", int64_t{view.row.priority})
+      .Add("submitted_us", view.row.submitted_us)
+      .Add("finished_us", view.row.finished_us)
+      .Add("tasks", view.row.tasks)
+      .Add("done", view.tasks_done)
+      .Add("known", view.row.known_tasks)
+      .Add("run_us", view.row.run_us)
+      .Add("left_low_us", int64_t{view.left_low.count()})
+      .Add("left_high_us", int64_t{view.left_high.count()})
+      .Add("phases", phases)
+      .Add("previews", previews);
 }
 
-nlohmann::json JsonOf(const job::WorkerView& view) {
-  return {{"name", view.about.name},   {"cores", view.about.cores},
-          {"draining", view.draining}, {"leases", view.leases},
-          {"done", view.tasks_done},   {"failed", view.tasks_failed},
-          {"isa", view.about.isa},     {"seen_us_ago", view.seen_ago.count()}};
+JsonLine JsonOf(const job::WorkerView& view) {
+  return JsonLine()
+      .Add("name", view.about.name)
+      .Add("cores", int64_t{view.about.cores})
+      .Add("draining", int64_t{view.draining})
+      .Add("leases", static_cast<int64_t>(view.leases))
+      .Add("done", view.tasks_done)
+      .Add("failed", view.tasks_failed)
+      .Add("isa", view.about.isa)
+      .Add("seen_us_ago", int64_t{view.seen_ago.count()});
+}
+
+JsonLine JsonOf(const store::FailureRow& failure) {
+  return JsonLine()
+      .Add("at_us", failure.at_us)
+      .Add("job", failure.job)
+      .Add("kind", failure.kind)
+      .Add("worker", failure.worker)
+      .Add("reason", failure.reason);
 }
 
 }  // namespace
@@ -89,34 +105,29 @@ std::string MetricsText(const job::Stats& stats, const std::vector<job::WorkerVi
 absl::StatusOr<std::string> StatusJson(job::Coordinator& coordinator) {
   constexpr int kShown = 50;
   const job::Stats stats = coordinator.GetStats();
-  nlohmann::json status = {{"ready", stats.ready},
-                           {"leases", stats.leases},
-                           {"workers_count", stats.workers},
-                           {"completed", stats.completed},
-                           {"known", stats.known},
-                           {"failed", stats.failed},
-                           {"store_bytes", stats.store_bytes},
-                           {"trouble", stats.trouble},
-                           {"now_us", coordinator.WallNowUs()}};
-  status["jobs"] = nlohmann::json::array();
-  BAKEWELL_ASSIGN_OR_RETURN(const std::vector<job::JobView> jobs, coordinator.List({"", {}, INT64_MAX, kShown}));
-  for (const job::JobView& job : jobs) {
+  BAKEWELL_ASSIGN_OR_RETURN(const std::vector<job::JobView> views, coordinator.List({"", {}, INT64_MAX, kShown}));
+  BAKEWELL_ASSIGN_OR_RETURN(const std::vector<store::FailureRow> rows, coordinator.Failures(0, kShown));
+  std::vector<JsonLine> jobs, workers, failures;
+  for (const job::JobView& job : views) {
     // A running job in full, with its partial pictures.
     const auto full = coordinator.Get(job.row.id);
-    status["jobs"].push_back(JsonOf(full.ok() ? *full : job));
+    jobs.push_back(JsonOf(full.ok() ? *full : job));
   }
-  status["workers"] = nlohmann::json::array();
-  for (const job::WorkerView& worker : coordinator.Workers()) status["workers"].push_back(JsonOf(worker));
-  status["failures"] = nlohmann::json::array();
-  BAKEWELL_ASSIGN_OR_RETURN(const std::vector<store::FailureRow> failures, coordinator.Failures(0, kShown));
-  for (const store::FailureRow& failure : failures) {
-    status["failures"].push_back({{"at_us", failure.at_us},
-                                  {"job", failure.job},
-                                  {"kind", failure.kind},
-                                  {"worker", failure.worker},
-                                  {"reason", failure.reason}});
-  }
-  return status.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  for (const job::WorkerView& worker : coordinator.Workers()) workers.push_back(JsonOf(worker));
+  for (const store::FailureRow& failure : rows) failures.push_back(JsonOf(failure));
+  return JsonLine()
+      .Add("ready", static_cast<int64_t>(stats.ready))
+      .Add("leases", static_cast<int64_t>(stats.leases))
+      .Add("completed", stats.completed)
+      .Add("known", stats.known)
+      .Add("failed", stats.failed)
+      .Add("store_bytes", stats.store_bytes)
+      .Add("trouble", stats.trouble)
+      .Add("now_us", coordinator.WallNowUs())
+      .Add("jobs", jobs)
+      .Add("workers", workers)
+      .Add("failures", failures)
+      .Text();
 }
 
 }  // namespace bakewell::http

@@ -1,4 +1,4 @@
-#include "server/program.h"
+#include "server/cli/program.h"
 #include "tests/support/synthetic.h"
 
 int main(int argc, char** argv) {

@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "tests/support/synthetic.h"
-#include "worker/program.h"
+#include "worker/cli/program.h"
 
 namespace bakewell {
 namespace {

@@ -59,7 +59,7 @@ absl::StatusOr<Registration> FarmLink::Register(const WorkerIdentity& identity, 
   for (const TaskKey& key : held) request.add_held()->set_key(DigestToBytes(key.digest));
   v1::RegisterResponse response;
   grpc::ClientContext context;
-  connection_->Prepare(context, kCall);
+  connection_->Prepare(context, std::chrono::seconds(5));
   BAKEWELL_RETURN_IF_ERROR(FromGrpc(StubOf(*connection_)->Register(&context, request, &response)));
   return Registration{response.worker_id(), std::chrono::microseconds(response.heartbeat_us()),
                       LeasesFrom(response.adopted())};
@@ -70,7 +70,7 @@ absl::Status FarmLink::Heartbeat(uint64_t worker_id) {
   request.set_worker_id(worker_id);
   v1::HeartbeatResponse response;
   grpc::ClientContext context;
-  connection_->Prepare(context, std::chrono::seconds(5));
+  connection_->Prepare(context, std::chrono::seconds(3));
   return FromGrpc(StubOf(*connection_)->Heartbeat(&context, request, &response));
 }
 
@@ -120,7 +120,7 @@ absl::Status FarmLink::Release(uint64_t worker_id, const std::vector<std::pair<u
   }
   v1::ReleaseResponse response;
   grpc::ClientContext context;
-  connection_->Prepare(context, std::chrono::seconds(5));
+  connection_->Prepare(context, std::chrono::seconds(2));
   return FromGrpc(StubOf(*connection_)->Release(&context, request, &response));
 }
 

@@ -1,4 +1,4 @@
-#include "worker/program.h"
+#include "worker/cli/program.h"
 
 #include <signal.h>
 #include <spdlog/sinks/stdout_color_sinks.h>

@@ -1,13 +1,14 @@
-#include "server/program.h"
+#include "server/cli/program.h"
 
 #include <absl/strings/str_cat.h>
-#include <openssl/rand.h>
 #include <signal.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <map>
+#include <random>
 
 #include "server/http/dashboard.h"
 #include "server/rpc/auth.h"
@@ -97,15 +98,19 @@ int64_t NowUs() {
       .count();
 }
 
+// 256 bits of the kernel's, in hexadecimal.
+std::string RandomToken() {
+  Digest secret;
+  std::random_device random;
+  for (uint8_t& byte : secret.bytes) byte = static_cast<uint8_t>(random());
+  return secret.Hex();
+}
+
 absl::Status AddToken(const std::string& data, const TokenFlags& flags) {
   if (!IsPlainName(flags.user)) return absl::InvalidArgumentError("--user must be 1 to 64 of [A-Za-z0-9_.-]");
   std::filesystem::create_directories(data);
   BAKEWELL_ASSIGN_OR_RETURN(const auto tables, store::Tables::Open(std::filesystem::path(data) / "farm.db"));
-  Digest secret;
-  if (RAND_bytes(secret.bytes.data(), static_cast<int>(secret.bytes.size())) != 1) {
-    return absl::InternalError("no random bytes");
-  }
-  const std::string token = secret.Hex();
+  const std::string token = RandomToken();
   const int64_t expires_us = flags.days == 0 ? 0 : NowUs() + int64_t{86'400'000'000} * flags.days;
   BAKEWELL_RETURN_IF_ERROR(
       tables->PutToken({Sha256Of(token), flags.user, ScopesFrom(flags.scopes), NowUs(), expires_us}));
