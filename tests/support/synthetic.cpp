@@ -38,6 +38,7 @@ plan::PlannedTask MakeTask(TaskSpec spec, const SyntheticScene& scene) {
 std::string WorkSettings(const SyntheticScene& scene, int index) {
   FieldWriter writer;
   writer.Put(static_cast<uint32_t>(index));
+  writer.Put(static_cast<uint32_t>(scene.seed));
   writer.Put(static_cast<uint32_t>(scene.work_us));
   writer.Put(static_cast<uint32_t>(scene.spin_hashes));
   writer.Put(static_cast<uint32_t>(scene.bytes));
@@ -142,7 +143,7 @@ absl::StatusOr<MadeOutputs> SyntheticExecutor::Run(const TaskSpec& spec, const T
   ++runs;
   if (before) BAKEWELL_RETURN_IF_ERROR(before(spec));
   FieldReader settings(spec.settings);
-  settings.Get<uint32_t>();
+  settings.Get<uint64_t>();  // index and seed: only their bytes count
   const auto work = microseconds(settings.Get<uint32_t>());
   const uint32_t hashes = settings.Get<uint32_t>(), size_bytes = settings.Get<uint32_t>();
   BAKEWELL_RETURN_IF_ERROR(settings.Finish("synthetic settings"));

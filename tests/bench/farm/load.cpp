@@ -55,13 +55,20 @@ class Latencies {
 class Timer {
  public:
   Timer() : thread_([this] { Loop(); }) {}
-  ~Timer() {
+  ~Timer() { Stop(); }
+  void Stop() {
+    if (!thread_.joinable()) return;
     {
       const std::lock_guard lock(mutex_);
       stopping_ = true;
     }
     wake_.notify_all();
     thread_.join();
+  }
+  // The longest that anything had to wait beyond its time.
+  double late_ms() {
+    const std::lock_guard lock(mutex_);
+    return late_ms_;
   }
   void At(Clock::time_point due, std::function<void()> work) {
     const std::lock_guard lock(mutex_);
@@ -84,6 +91,8 @@ class Timer {
       else if (queue_.top().due > Clock::now())
         wake_.wait_until(lock, queue_.top().due);
       else {
+        late_ms_ =
+            std::max(late_ms_, std::chrono::duration<double, std::milli>(Clock::now() - queue_.top().due).count());
         const auto work = queue_.top().work;
         queue_.pop();
         lock.unlock();
@@ -97,6 +106,7 @@ class Timer {
   std::priority_queue<Item> queue_;
   uint64_t next_ = 0;
   bool stopping_ = false;
+  double late_ms_ = 0;
   std::thread thread_;
 };
 
@@ -280,6 +290,8 @@ int Run(const Flags& flags) {
   const double cpu = CpuSeconds();
   std::this_thread::sleep_for(std::chrono::seconds(flags.seconds));
   const job::Stats after = farm.coordinator().GetStats();
+  std::printf("%zu workers registered, %zu leases held, %zu tasks ready, timer late by %.1f ms at most\n",
+              after.workers, after.leases, after.ready, shared.timer.late_ms());
   shared.lease.Print("lease", flags.seconds);
   shared.complete.Print("complete", flags.seconds);
   rusage usage{};
@@ -289,7 +301,9 @@ int Run(const Flags& flags) {
       flags.workers, after.tasks, static_cast<long long>(after.completed - before.completed),
       static_cast<double>(after.writes - before.writes) / static_cast<double>(after.commits - before.commits),
       (CpuSeconds() - cpu) / flags.seconds, usage.ru_maxrss / 1024);
+  std::fflush(stdout);
   shared.stopping = true;
+  shared.timer.Stop();
   for (const auto& worker : workers) worker->Stop();
   WaitFor([&] { return shared.calls == 0; });
   return 0;
