@@ -83,6 +83,10 @@ FarmClient::FarmClient(std::shared_ptr<Connection> connection, std::chrono::mill
 
 FarmClient::~FarmClient() = default;
 
+std::chrono::milliseconds FarmClient::CallTime() const {
+  return std::clamp<std::chrono::milliseconds>(patience_, std::chrono::seconds(1), kCall);
+}
+
 absl::Status FarmClient::Retry(const std::function<absl::Status()>& call) {
   const auto give_up = std::chrono::steady_clock::now() + patience_;
   auto pause = std::chrono::milliseconds(50);
@@ -135,7 +139,7 @@ absl::StatusOr<v1::Job> FarmClient::Get(int64_t job) {
   v1::Job response;
   const absl::Status status = Retry([&] {
     grpc::ClientContext context;
-    connection_->Prepare(context, kCall);
+    connection_->Prepare(context, CallTime());
     return FromGrpc(stubs_->bake->Get(&context, request, &response));
   });
   BAKEWELL_RETURN_IF_ERROR(status);
@@ -149,7 +153,7 @@ absl::StatusOr<std::vector<v1::Job>> FarmClient::List(const v1::ListRequest& fil
     v1::ListResponse response;
     const absl::Status status = Retry([&] {
       grpc::ClientContext context;
-      connection_->Prepare(context, kCall);
+      connection_->Prepare(context, CallTime());
       return FromGrpc(stubs_->bake->List(&context, request, &response));
     });
     BAKEWELL_RETURN_IF_ERROR(status);
@@ -166,7 +170,7 @@ absl::StatusOr<v1::Job> FarmClient::Cancel(int64_t job) {
   v1::Job response;
   const absl::Status status = Retry([&] {
     grpc::ClientContext context;
-    connection_->Prepare(context, kCall);
+    connection_->Prepare(context, CallTime());
     return FromGrpc(stubs_->bake->Cancel(&context, request, &response));
   });
   BAKEWELL_RETURN_IF_ERROR(status);
@@ -263,7 +267,7 @@ absl::StatusOr<v1::ListWorkersResponse> FarmClient::Workers() {
   v1::ListWorkersResponse response;
   const absl::Status status = Retry([&] {
     grpc::ClientContext context;
-    connection_->Prepare(context, kCall);
+    connection_->Prepare(context, CallTime());
     return FromGrpc(stubs_->admin->ListWorkers(&context, {}, &response));
   });
   BAKEWELL_RETURN_IF_ERROR(status);
@@ -274,7 +278,7 @@ absl::StatusOr<v1::StatusResponse> FarmClient::Status() {
   v1::StatusResponse response;
   const absl::Status status = Retry([&] {
     grpc::ClientContext context;
-    connection_->Prepare(context, kCall);
+    connection_->Prepare(context, CallTime());
     return FromGrpc(stubs_->admin->Status(&context, {}, &response));
   });
   BAKEWELL_RETURN_IF_ERROR(status);
@@ -288,7 +292,7 @@ absl::Status FarmClient::DrainWorker(uint64_t worker, bool draining) {
   return Retry([&] {
     v1::DrainResponse response;
     grpc::ClientContext context;
-    connection_->Prepare(context, kCall);
+    connection_->Prepare(context, CallTime());
     return FromGrpc(stubs_->admin->Drain(&context, request, &response));
   });
 }

@@ -55,6 +55,8 @@ class FarmClient {
   absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(int64_t target_bytes, std::chrono::microseconds grace);
 
  private:
+  // The deadline of a call: patience may be shorter than what the call would get.
+  std::chrono::milliseconds CallTime() const;
   absl::Status Retry(const std::function<absl::Status()>& call);
   absl::Status UploadScene(std::string_view scene, const Digest& digest);
   absl::Status WatchOnce(int64_t job, const std::function<bool(const v1::Job&)>& changed, v1::Job& last);

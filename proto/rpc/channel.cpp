@@ -2,6 +2,7 @@
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <google/protobuf/stubs/logging.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 
@@ -36,6 +37,8 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> Credentials(const Conn
 }
 
 }  // namespace
+
+void SilenceProtobuf() { google::protobuf::SetLogHandler(nullptr); }
 
 bool IsLoopback(const std::string& address) {
   return absl::StartsWith(address, "localhost:") || absl::StartsWith(address, "127.") ||

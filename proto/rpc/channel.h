@@ -45,6 +45,9 @@ class Connection {
 inline constexpr int kMaxMessageBytes = 4 << 20;
 inline constexpr size_t kChunkBytes = 512 << 10;
 
+// Keeps protobuf from printing what it refuses, for the whole process: hostile bytes would fill the log.
+void SilenceProtobuf();
+
 // Whether host:port names this machine only.
 bool IsLoopback(const std::string& address);
 

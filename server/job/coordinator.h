@@ -2,17 +2,13 @@
 
 #include <absl/container/flat_hash_map.h>
 
-#include <condition_variable>
-#include <filesystem>
-#include <map>
 #include <memory>
-#include <mutex>
-#include <set>
 #include <shared_mutex>
-#include <string_view>
-#include <thread>
 
+#include "server/job/options.h"
+#include "server/job/state.h"
 #include "server/job/types.h"
+#include "server/job/watch_list.h"
 #include "server/plan/plan.h"
 #include "server/sched/scheduler.h"
 #include "server/store/blobs.h"
@@ -21,17 +17,6 @@
 #include "server/store/writer.h"
 
 namespace bakewell::job {
-
-struct Options {
-  std::filesystem::path folder;  // database and blobs; made if it is missing
-  int64_t quota_bytes = 0;       // of the blob store; 0: none
-  store::AccountRow defaults;    // limits of users without a row of their own
-  sched::Options sched;
-  int io_threads = 8;
-  std::function<sched::Time()> steady_now;    // default: std::chrono::steady_clock
-  std::function<int64_t()> wall_now_us;       // default: std::chrono::system_clock, microseconds since 1970
-  std::function<void(std::string_view)> log;  // one line an event; default: nowhere
-};
 
 // The farm's memory and will: jobs from submit to artifacts. It joins the planner (what is to be done), the scheduler
 // (who does it when) and the store (what is safe). Thread safe. After a crash, Open() on the same folder goes on where
@@ -57,12 +42,7 @@ class Coordinator {
   // kNotFound, or kDataLoss if the bytes were lost: submit again.
   absl::StatusOr<TaskOutput> FindArtifact(int64_t id, std::string_view name);
 
-  // `changed` is called, at most ten times a second and once when it ends, from a thread of the coordinator.
-  using WatchId = uint64_t;
-  WatchId Watch(int64_t id, std::function<void()> changed);
-  void Unwatch(WatchId watch);  // `changed` is not running any more when this returns
-
-  // --- workers ---
+  WatchList& watches() { return watches_; }  // notified at most ten times a second, and when a job ends
   // The bits of the kinds and versions that this farm plans.
   uint64_t CapabilitiesOf(const std::vector<plan::Kind>& kinds) const;
   const std::vector<plan::Kind>& kinds() const { return kinds_; }
@@ -79,13 +59,11 @@ class Coordinator {
   bool Drain(sched::WorkerId worker, bool draining);
   void RemoveWorker(sched::WorkerId worker);
   std::vector<WorkerView> Workers();
-
   // `done`: after the commit. kNotFound: an output's blob is missing; kAborted: other outputs are known.
   void Complete(const CompletedTask& task, Done done);
   void Fail(const FailedTask& task);
   void Release(sched::WorkerId worker, const std::vector<std::pair<sched::LeaseToken, TaskKey>>& leases);
 
-  // --- blobs ---
   store::BlobStore& blobs() { return *blobs_; }
   store::IoPool& io() { return io_; }
   store::Writer& writer() { return *writer_; }
@@ -95,55 +73,16 @@ class Coordinator {
   absl::StatusOr<int64_t> CountTokens();
 
   Stats GetStats();
-  std::chrono::microseconds heartbeat_timeout() const { return options_.sched.heartbeat_timeout; }
+  const Options& options() const { return options_; }
   int64_t WallNowUs() const { return options_.wall_now_us(); }
 
  private:
   using TaskId = sched::TaskId;
   using Lock = std::unique_lock<std::mutex>;
-  struct Task {
-    TaskKey key;
-    TaskSpec spec;
-    TaskOutputs outputs;  // once done
-    int64_t memory_bytes = 0;
-    std::chrono::microseconds cost{0};
-    bool done = false;
-    std::vector<int64_t> jobs;
-  };
-  struct Phase {
-    int64_t done = 0, total = 0;
-    std::chrono::microseconds left{0};  // estimated, of what is not done
-  };
-  struct Job {
-    store::JobRow row;
-    std::vector<plan::TaskGraph> stages;  // without the tasks' specs once they are in tasks_
-    std::map<std::string, Phase> phases;
-    int64_t tasks_done = 0;
-    bool changed = true, ending = false;
-  };
-  struct Worker {
-    WorkerDescription about;
-    LeaseSink sink;
-    uint64_t connection = 0;
-    int credit = 0;
-    bool draining = false;
-    int64_t done = 0, failed = 0;
-    sched::Time seen{0};
-  };
-  struct Stage {
-    plan::TaskGraph graph;
-    std::vector<std::optional<TaskOutputs>> known;  // by task
-  };
-  struct Watcher {
-    int64_t job;
-    std::function<void()> changed;
-  };
-
   Coordinator(Options options, const plan::Planner& planner, std::unique_ptr<store::BlobStore> blobs,
               std::unique_ptr<store::Tables> reader, std::unique_ptr<store::Writer> writer, int64_t epoch);
   sched::Time Now() const { return options_.steady_now(); }
 
-  // submit.cpp
   absl::Status CheckRequest(const SubmitRequest& request);
   absl::Status CheckQuota(const SubmitRequest& request, const store::AccountRow& account);
   absl::StatusOr<store::AccountRow> AccountOf(const std::string& user);
@@ -158,18 +97,11 @@ class Coordinator {
   absl::Status ContinueJob(int64_t id);
   absl::Status Recover();
   absl::Status RecoverJob(const store::JobRow& row);
-  plan::BlobReader Reader();
-
-  // finish.cpp
   JobView ViewOf(const Job& job) const;
-  static JobView ViewOfRow(const store::JobRow& row);
   TaskOutputs ArtifactsOf(const Job& job) const;
   void EndJob(int64_t id, store::JobState state, const std::string& reason, Done done);
   void ForgetTasks(int64_t id);
-  void Touch(int64_t id);
   void CountDone(Task& task);
-
-  // work.cpp
   void HandleEvents();
   void Dispatch();
   void LeaseTo(sched::WorkerId id, Worker& worker);
@@ -203,16 +135,12 @@ class Coordinator {
   std::map<int64_t, Job> jobs_;  // running
   absl::flat_hash_map<sched::WorkerId, Worker> workers_;
   std::set<sched::WorkerId> hungry_;
-  std::map<WatchId, Watcher> watchers_;
-  std::condition_variable watchers_idle_;
-  WatchId next_watch_ = 1, notifying_ = 0;
   int64_t next_job_ = 1;
-  uint64_t next_worker_ = 1;
+  uint64_t next_worker_ = 1, next_order_ = 0, next_connection_ = 1;
   Stats stats_;
   bool stopping_ = false, tick_now_ = false;
-  uint64_t next_order_ = 0;
-  uint64_t next_connection_ = 1;
 
+  WatchList watches_;
   std::unique_ptr<store::Writer> writer_;
   store::IoPool io_;
   std::condition_variable tick_;

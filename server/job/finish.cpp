@@ -2,6 +2,8 @@
 #include <absl/strings/str_cat.h>
 
 #include <future>
+#include <set>
+#include <utility>
 
 #include <algorithm>
 
@@ -21,6 +23,14 @@ const TaskOutput* FindOutput(const TaskOutputs& outputs, std::string_view name) 
   return found == outputs.end() ? nullptr : &*found;
 }
 
+JobView ViewOfRow(const store::JobRow& row) {
+  JobView view;
+  view.row = row;
+  view.tasks_done = row.state == store::JobState::kDone ? row.tasks : 0;
+  view.artifacts = ParseOutputs(row.artifacts).value_or(TaskOutputs{});
+  return view;
+}
+
 }  // namespace
 
 TaskOutputs Coordinator::ArtifactsOf(const Job& job) const {
@@ -37,14 +47,6 @@ TaskOutputs Coordinator::ArtifactsOf(const Job& job) const {
     }
   }
   return artifacts;
-}
-
-JobView Coordinator::ViewOfRow(const store::JobRow& row) {
-  JobView view;
-  view.row = row;
-  view.tasks_done = row.state == store::JobState::kDone ? row.tasks : 0;
-  view.artifacts = ParseOutputs(row.artifacts).value_or(TaskOutputs{});
-  return view;
 }
 
 JobView Coordinator::ViewOf(const Job& job) const {
@@ -199,42 +201,17 @@ absl::StatusOr<store::CollectReport> Coordinator::CollectGarbage(int64_t target_
   });
 }
 
-Coordinator::WatchId Coordinator::Watch(int64_t id, std::function<void()> changed) {
-  const Lock lock(mutex_);
-  watchers_[next_watch_] = {id, std::move(changed)};
-  return next_watch_++;
-}
-
-void Coordinator::Unwatch(WatchId watch) {
-  Lock lock(mutex_);
-  watchers_.erase(watch);
-  watchers_idle_.wait(lock, [&] { return notifying_ != watch; });
-}
-
 void Coordinator::NotifyWatchers() {
-  std::vector<WatchId> due;
+  std::set<int64_t> running, changed;
   {
     const Lock lock(mutex_);
-    for (const auto& [id, watcher] : watchers_) {
-      const auto job = jobs_.find(watcher.job);
-      if (job == jobs_.end() || job->second.changed) due.push_back(id);
+    for (auto& [id, job] : jobs_) {
+      running.insert(id);
+      if (std::exchange(job.changed, false)) changed.insert(id);
     }
-    for (auto& [id, job] : jobs_) job.changed = false;
   }
-  for (const WatchId id : due) {
-    std::function<void()> changed;
-    {
-      const Lock lock(mutex_);
-      const auto watcher = watchers_.find(id);
-      if (watcher == watchers_.end()) continue;
-      changed = watcher->second.changed;
-      notifying_ = id;
-    }
-    changed();
-    const Lock lock(mutex_);
-    notifying_ = 0;
-    watchers_idle_.notify_all();
-  }
+  // A job that is not running any more has changed for the last time.
+  watches_.Notify([&](int64_t job) { return changed.contains(job) || !running.contains(job); });
 }
 
 }  // namespace bakewell::job

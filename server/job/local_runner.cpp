@@ -37,7 +37,7 @@ void LocalRunner::Beat(std::stop_token stop) {
     lock.unlock();
     coordinator_.Heartbeat(worker_);
     lock.lock();
-    wake_.wait_for(lock, stop, coordinator_.heartbeat_timeout() / 3, [] { return false; });
+    wake_.wait_for(lock, stop, coordinator_.options().sched.heartbeat_timeout / 3, [] { return false; });
   }
 }
 

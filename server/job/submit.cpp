@@ -20,10 +20,6 @@ std::chrono::microseconds Scaled(std::chrono::microseconds time, double factor) 
 
 }  // namespace
 
-plan::BlobReader Coordinator::Reader() {
-  return [this](const Digest& digest) { return blobs_->Get(digest); };
-}
-
 absl::Status Coordinator::CheckRequest(const SubmitRequest& request) {
   if (!IsPlainName(request.client_key)) {
     return absl::InvalidArgumentError("client_key must be 1 to 64 of [A-Za-z0-9_.-]");
@@ -75,7 +71,7 @@ absl::StatusOr<std::optional<store::KnownTask>> Coordinator::FindUsable(const Ta
   return std::optional<store::KnownTask>();
 }
 
-absl::StatusOr<Coordinator::Stage> Coordinator::LookUp(plan::TaskGraph graph) {
+absl::StatusOr<Stage> Coordinator::LookUp(plan::TaskGraph graph) {
   constexpr int64_t kTouchEveryUs = 600'000'000;
   Stage stage;
   std::vector<TaskKey> touched;
@@ -96,12 +92,13 @@ absl::StatusOr<Coordinator::Stage> Coordinator::LookUp(plan::TaskGraph graph) {
 
 // Plans from where `stages` ends, for as long as the next stage depends on what is known. `gate`: the outputs that the
 // first of them waits for, where the caller has them.
-absl::StatusOr<std::vector<Coordinator::Stage>> Coordinator::PlanKnown(const plan::PlanRequest& request,
-                                                                       std::vector<plan::TaskGraph> stages,
-                                                                       std::optional<TaskOutputs> gate) {
+absl::StatusOr<std::vector<Stage>> Coordinator::PlanKnown(const plan::PlanRequest& request,
+                                                          std::vector<plan::TaskGraph> stages,
+                                                          std::optional<TaskOutputs> gate) {
+  const plan::BlobReader blobs_reader = [this](const Digest& digest) { return blobs_->Get(digest); };
   std::vector<Stage> planned;
   if (stages.empty()) {
-    BAKEWELL_ASSIGN_OR_RETURN(plan::TaskGraph graph, planner_.Plan(request, Reader()));
+    BAKEWELL_ASSIGN_OR_RETURN(plan::TaskGraph graph, planner_.Plan(request, blobs_reader));
     BAKEWELL_RETURN_IF_ERROR(plan::CheckGraph(graph, stages));
     stages.push_back(graph);
     BAKEWELL_ASSIGN_OR_RETURN(Stage stage, LookUp(std::move(graph)));
@@ -113,7 +110,7 @@ absl::StatusOr<std::vector<Coordinator::Stage>> Coordinator::PlanKnown(const pla
       if (!known) break;
       gate = known->outputs;
     }
-    BAKEWELL_ASSIGN_OR_RETURN(plan::TaskGraph graph, planner_.Continue(request, stages, *gate, Reader()));
+    BAKEWELL_ASSIGN_OR_RETURN(plan::TaskGraph graph, planner_.Continue(request, stages, *gate, blobs_reader));
     gate.reset();
     BAKEWELL_RETURN_IF_ERROR(plan::CheckGraph(graph, stages));
     stages.push_back(graph);

@@ -85,6 +85,7 @@ FarmServer::FarmServer(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) 
 
 absl::StatusOr<std::unique_ptr<FarmServer>> FarmServer::Start(job::Coordinator& coordinator,
                                                               const ServerOptions& options) {
+  SilenceProtobuf();
   BAKEWELL_RETURN_IF_ERROR(CheckExposure(coordinator, options));
   BAKEWELL_ASSIGN_OR_RETURN(const auto credentials, Credentials(options));
   auto parts = std::make_unique<Parts>(coordinator, options);

@@ -7,7 +7,7 @@ namespace bakewell::rpc {
 WatchStream* WatchStream::Start(job::Coordinator& coordinator, int64_t job, Look look, std::function<void()> ended) {
   std::shared_ptr<WatchStream> stream(new WatchStream(coordinator, std::move(look), std::move(ended)));
   stream->self_ = stream;
-  stream->watch_ = coordinator.Watch(job, [weak = std::weak_ptr(stream)] {
+  stream->watch_ = coordinator.watches().Add(job, [weak = std::weak_ptr(stream)] {
     if (const auto strong = weak.lock()) strong->Changed();
   });
   stream->Changed();
@@ -58,7 +58,7 @@ void WatchStream::FinishLocked(const absl::Status& status) {
 }
 
 void WatchStream::OnDone() {
-  coordinator_.Unwatch(watch_);
+  coordinator_.watches().Remove(watch_);
   ended_();
   const std::shared_ptr<WatchStream> last = std::move(self_);
 }

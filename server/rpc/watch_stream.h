@@ -30,7 +30,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::Job>, public std::
   job::Coordinator& coordinator_;
   const Look look_;
   const std::function<void()> ended_;
-  job::Coordinator::WatchId watch_ = 0;
+  job::WatchList::Id watch_ = 0;
   std::shared_ptr<WatchStream> self_;
 
   std::mutex mutex_;  // guards what follows

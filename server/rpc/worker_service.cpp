@@ -100,7 +100,7 @@ absl::StatusOr<job::FailedTask> FailedFrom(const v1::FailRequest& request) {
 grpc::ServerUnaryReactor* WorkerService::Register(grpc::CallbackServerContext* context,
                                                   const v1::RegisterRequest* request, v1::RegisterResponse* response) {
   return AtOnce(services_, context, Any(Scope::kWork), [&](const Caller&) {
-    const auto heartbeat = services_.coordinator.heartbeat_timeout() / kHeartbeatsPerTimeout;
+    const auto heartbeat = services_.coordinator.options().sched.heartbeat_timeout / kHeartbeatsPerTimeout;
     return RegisterWorker(services_.coordinator, *request, heartbeat, *response);
   });
 }
