@@ -1,6 +1,7 @@
 #include "client/cli/cli.h"
 
 #include "client/cli/commands.h"
+#include "client/cli/farm_commands.h"
 #include "client/cli/interrupt.h"
 #include "core/artifact/json_line.h"
 #include "core/artifact/manifest.h"
@@ -54,6 +55,7 @@ int RunCli(int argc, const char* const* argv, const Console& console, const Bake
   AddReferenceCommand(app, console, bakers, &exit_code);
   AddCompareCommand(app, console, &exit_code);
   AddUnwrapCommand(app, console, bakers, &exit_code);
+  AddFarmCommands(app, console, &exit_code);
   if (argc > 1 && argv[1][0] != '-' && !HasCommand(app, argv[1])) {
     console.err << "bakewell: there is no command " << argv[1] << "; bakewell --help lists them" << std::endl;
     return kExitUserError;

@@ -7,7 +7,7 @@
 #include "client/gltf/level.h"
 #include "client/local/bake.h"
 #include "core/artifact/manifest.h"
-#include "worker/gather/tile.h"
+#include "worker/level/level.h"
 
 namespace bakewell {
 
@@ -37,13 +37,6 @@ struct PreparedLevel {
 
 absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings& settings, PhaseClock& clock,
                                            Progress& progress);
-
-// Samples, photons and target of a quality, with the settings' own numbers in their place.
-struct Budget {
-  GatherOptions gather;
-  int64_t photons = 0;
-};
-Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels);
 
 // The lit texels of a level, element i for TexelMap::texels[i].
 struct BakedTexels {

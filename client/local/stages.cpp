@@ -9,49 +9,12 @@
 namespace bakewell {
 namespace {
 
-struct QualityNumbers {
-  int min_samples, max_samples, photons_per_texel;
-  float target_error;
-};
-
-QualityNumbers NumbersOf(Quality quality) {
-  switch (quality) {
-    case Quality::kPreview:
-      return {8, 256, 6, 0.08f};
-    case Quality::kMedium:
-      return {16, 512, 24, 0.04f};
-    case Quality::kHigh:
-      break;
-  }
-  return {32, 4096, 64, 0.015f};
-}
-
-constexpr int64_t kLeastPhotons = 32768;
-
-// Mean luminance that the photons brought to the fronts of lightmapped surfaces, to judge errors against.
-float MeanIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache) {
-  double sum = 0, area = 0;
-  for (const Texel& texel : texels.texels) {
-    const uint32_t triangle = texels.fragments[texel.fragment_begin].triangle;
-    const CellIrradiance& light = cache.irradiance[2 * static_cast<size_t>(cells.CellAt(triangle, texel.position))];
-    sum += static_cast<double>(Luminance(light.direct + light.indirect));
-    area += 1;
-  }
-  return area > 0 ? static_cast<float>(sum / area) : 0;
-}
-
 void Add(const GatherCounters& from, GatherCounters& to) {
   to.gather_rays += from.gather_rays;
   to.shadow_rays += from.shadow_rays;
   to.bounce_rays += from.bounce_rays;
   to.validity_rays += from.validity_rays;
   to.bad_samples += from.bad_samples;
-}
-
-// Cells grow in number more slowly than photons, so that both the blur and the noise of the cache go to zero.
-int64_t CellsFor(int64_t photons) {
-  return std::max<int64_t>(1024, static_cast<int64_t>(4 * std::cbrt(static_cast<double>(photons)) *
-                                                      std::cbrt(static_cast<double>(photons))));
 }
 
 struct Photons {
@@ -93,20 +56,6 @@ absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSe
 }
 
 }  // namespace
-
-Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
-  const QualityNumbers numbers = NumbersOf(settings.quality);
-  Budget budget;
-  budget.gather.min_samples = settings.min_samples > 0 ? settings.min_samples : numbers.min_samples;
-  budget.gather.max_samples = settings.max_samples > 0 ? settings.max_samples : numbers.max_samples;
-  budget.gather.min_samples = std::min(budget.gather.min_samples, budget.gather.max_samples);
-  budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
-  budget.gather.seed = settings.seed;
-  const int64_t texel_count = static_cast<int64_t>(texels.texels.size());
-  budget.photons =
-      settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texel_count * numbers.photons_per_texel);
-  return budget;
-}
 
 absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const BakeSettings& settings, PhaseClock& clock,
                                        Progress& progress) {

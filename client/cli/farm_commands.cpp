@@ -1,0 +1,303 @@
+#include "client/cli/farm_commands.h"
+
+#include <absl/strings/str_format.h>
+
+#include <fstream>
+#include <iterator>
+#include <memory>
+
+#include "client/cli/bake_flags.h"
+#include "client/cli/commands.h"
+#include "client/gltf/level.h"
+#include "client/rpc/farm_client.h"
+#include "core/artifact/json_line.h"
+#include "core/atlas/serialize.h"
+#include "core/scene/canonical.h"
+#include "proto/bakewell/v1/settings.pb.h"
+#include "proto/settings.h"
+
+namespace bakewell {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// What every one of the commands has.
+struct FarmFlags {
+  ConnectOptions connect;
+  std::string token_file;
+  bool json = false;
+  BakeFlags bake;
+  int64_t job = 0;
+  std::string name, client_key, output = "out", user;
+  bool wait = false, interactive = false;
+  int limit = 20;
+};
+
+constexpr char kLayoutFile[] = "atlas-layout.bin";
+
+absl::StatusOr<std::unique_ptr<FarmClient>> Open(FarmFlags& flags) {
+  if (!flags.token_file.empty()) {
+    std::ifstream file(flags.token_file);
+    if (!(file >> flags.connect.token)) return absl::InvalidArgumentError("cannot read a token in " + flags.token_file);
+  } else if (const char* token = std::getenv("BAKEWELL_TOKEN")) {
+    flags.connect.token = token;
+  }
+  BAKEWELL_ASSIGN_OR_RETURN(auto connection, Connection::Open(flags.connect));
+  return std::make_unique<FarmClient>(std::move(connection));
+}
+
+// A scene as it is submitted: the environment of the settings moves into it.
+struct Submission {
+  LoadedLevel level;
+  std::string scene;
+  SubmitOptions options;
+};
+
+absl::StatusOr<Submission> Prepare(const FarmFlags& flags) {
+  Submission submission;
+  BAKEWELL_ASSIGN_OR_RETURN(BakeSettings settings, SettingsFromFlags(flags.bake));
+  BAKEWELL_ASSIGN_OR_RETURN(submission.level, LoadLevel(flags.bake.scene));
+  if (settings.environment) submission.level.scene.environment = *settings.environment;
+  settings.environment.reset();
+  const std::vector<std::byte> bytes = SerializeScene(submission.level.scene);
+  submission.scene.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  submission.options = {flags.client_key, flags.name, ProtoFromSettings(settings).SerializeAsString(),
+                        flags.interactive};
+  return submission;
+}
+
+std::string StateName(v1::JobState state) {
+  std::string name = v1::JobState_Name(state);
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return name;
+}
+
+void PrintJob(const v1::Job& job, const FarmFlags& flags, const Console& console) {
+  if (flags.json) {
+    JsonLine line;
+    line.Add("event", "job").Add("job", job.id()).Add("state", StateName(job.state())).Add("name", job.name());
+    line.Add("user", job.user()).Add("tasks", job.tasks_total()).Add("done", job.tasks_done());
+    line.Add("known", job.tasks_known()).Add("run_seconds", static_cast<double>(job.run_us()) * 1e-6);
+    if (job.has_left_low_us()) {
+      line.Add("left_low_seconds", static_cast<double>(job.left_low_us()) * 1e-6);
+      line.Add("left_high_seconds", static_cast<double>(job.left_high_us()) * 1e-6);
+    }
+    console.out << line.Add("reason", job.reason()).Text() << std::endl;
+    return;
+  }
+  console.out << absl::StrFormat("%6d  %-9s  %5d of %5d tasks (%d known)  %s%s%s\n", job.id(), StateName(job.state()),
+                                 job.tasks_done(), job.tasks_total(), job.tasks_known(), job.name(),
+                                 job.reason().empty() ? "" : ": ", job.reason())
+              << std::flush;
+}
+
+// One line that is written again: phases with their counts, and the time left.
+void PrintProgress(const v1::Job& job, const Console& console) {
+  constexpr int kWidth = 24;
+  const double share =
+      job.tasks_total() > 0 ? static_cast<double>(job.tasks_done()) / static_cast<double>(job.tasks_total()) : 0;
+  const int filled = static_cast<int>(share * kWidth);
+  std::string phase;
+  for (const v1::PhaseProgress& one : job.phases()) {
+    if (one.done() < one.total()) phase = absl::StrFormat("%s %d/%d", one.phase(), one.done(), one.total());
+  }
+  std::string left;
+  if (job.has_left_low_us()) {
+    left = absl::StrFormat(", %.0f to %.0f s left", static_cast<double>(job.left_low_us()) * 1e-6,
+                           static_cast<double>(job.left_high_us()) * 1e-6);
+  }
+  console.err << absl::StrFormat("\r\x1b[K[%s%s] %3.0f %%  %s%s", std::string(filled, '='),
+                                 std::string(kWidth - filled, ' '), share * 100, phase, left)
+              << std::flush;
+}
+
+absl::Status StatusOfEnded(const v1::Job& job) {
+  if (job.state() == v1::DONE) return absl::OkStatus();
+  if (job.state() == v1::CANCELLED) return absl::CancelledError("the job was cancelled");
+  return absl::AbortedError(absl::StrCat("job ", job.id(), " failed: ", job.reason()));
+}
+
+absl::StatusOr<v1::Job> WatchJob(FarmClient& client, int64_t id, const FarmFlags& flags, const Console& console) {
+  const auto changed = [&](const v1::Job& job) {
+    if (flags.json)
+      PrintJob(job, flags, console);
+    else if (console.err_is_terminal)
+      PrintProgress(job, console);
+    return true;
+  };
+  auto job = client.Watch(id, changed);
+  if (!flags.json && console.err_is_terminal) console.err << "\r\x1b[K" << std::flush;
+  return job;
+}
+
+// scene.glb with the lightmaps' coordinates, as `bake` writes it.
+absl::Status WriteSceneFile(const FarmFlags& flags, const LoadedLevel& level) {
+  std::ifstream file(fs::path(flags.output) / kLayoutFile, std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(file), {});
+  BAKEWELL_ASSIGN_OR_RETURN(const AtlasLayout layout, ParseLayout(bytes));
+  std::vector<LightmapFiles> pages;
+  for (size_t page = 0; page < layout.pages.size(); ++page) {
+    const std::string stem = absl::StrCat("lightmap-", page);
+    pages.push_back({stem + ".irradiance.exr", stem + ".sh.exr", stem + ".variance.exr"});
+  }
+  return WriteLevel(flags.bake.scene, level, layout, pages, fs::path(flags.output) / "scene.glb");
+}
+
+absl::Status Submit(FarmFlags& flags, const Console& console) {
+  flags.output = flags.bake.output;
+  BAKEWELL_ASSIGN_OR_RETURN(const Submission submission, Prepare(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  for (const std::string& warning : submission.level.warnings) console.err << "warning: " << warning << "\n";
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted, client->Submit(submission.scene, submission.options));
+  if (!flags.wait) {
+    BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client->Get(submitted.job_id()));
+    PrintJob(job, flags, console);
+    return absl::OkStatus();
+  }
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, WatchJob(*client, submitted.job_id(), flags, console));
+  PrintJob(job, flags, console);
+  BAKEWELL_RETURN_IF_ERROR(StatusOfEnded(job));
+  BAKEWELL_RETURN_IF_ERROR(client->FetchAll(job, flags.output));
+  return WriteSceneFile(flags, submission.level);
+}
+
+absl::Status Estimate(FarmFlags& flags, const Console& console) {
+  BAKEWELL_ASSIGN_OR_RETURN(const Submission submission, Prepare(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::EstimateResponse cost, client->Estimate(submission.scene, submission.options));
+  const double low = static_cast<double>(cost.run_us_low()) * 1e-6,
+               high = static_cast<double>(cost.run_us_high()) * 1e-6;
+  if (flags.json) {
+    console.out << JsonLine()
+                       .Add("event", "estimate")
+                       .Add("tasks", cost.tasks())
+                       .Add("known", cost.tasks_known())
+                       .Add("run_seconds_low", low)
+                       .Add("run_seconds_high", high)
+                       .Add("complete", int64_t{cost.complete()})
+                       .Text()
+                << std::endl;
+    return absl::OkStatus();
+  }
+  console.out << absl::StrFormat("%d tasks, %d of them known; %.1f to %.1f s of work%s\n", cost.tasks(),
+                                 cost.tasks_known(), low, high,
+                                 cost.complete() ? "" : ", and more once the charts are known");
+  return absl::OkStatus();
+}
+
+absl::Status List(FarmFlags& flags, const Console& console) {
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  v1::ListRequest filter;
+  filter.set_user(flags.user);
+  BAKEWELL_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client->List(filter, flags.limit));
+  for (const v1::Job& job : jobs) PrintJob(job, flags, console);
+  return absl::OkStatus();
+}
+
+absl::Status Watch(FarmFlags& flags, const Console& console) {
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, WatchJob(*client, flags.job, flags, console));
+  PrintJob(job, flags, console);
+  return StatusOfEnded(job);
+}
+
+absl::Status Cancel(FarmFlags& flags, const Console& console) {
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client->Cancel(flags.job));
+  PrintJob(job, flags, console);
+  return absl::OkStatus();
+}
+
+absl::Status Fetch(FarmFlags& flags, const Console& console) {
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client->Get(flags.job));
+  BAKEWELL_RETURN_IF_ERROR(client->FetchAll(job, flags.output));
+  for (const v1::Artifact& artifact : job.artifacts()) {
+    console.out << (fs::path(flags.output) / artifact.name()).string() << "\n";
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Workers(FarmFlags& flags, const Console& console) {
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::ListWorkersResponse response, client->Workers());
+  for (const v1::WorkerState& worker : response.workers()) {
+    if (flags.json) {
+      console.out << JsonLine()
+                         .Add("event", "worker")
+                         .Add("worker", static_cast<int64_t>(worker.id()))
+                         .Add("name", worker.name())
+                         .Add("cores", int64_t{worker.cores()})
+                         .Add("leases", int64_t{worker.leases()})
+                         .Add("done", worker.tasks_done())
+                         .Add("failed", worker.tasks_failed())
+                         .Text()
+                  << "\n";
+    } else {
+      console.out << absl::StrFormat("%-24s %3d cores  %3d leases  %6d done  %4d failed%s\n", worker.name(),
+                                     worker.cores(), worker.leases(), worker.tasks_done(), worker.tasks_failed(),
+                                     worker.draining() ? "  draining" : "");
+    }
+  }
+  console.out << std::flush;
+  return absl::OkStatus();
+}
+
+using Command = absl::Status (*)(FarmFlags&, const Console&);
+
+// Makes a subcommand that connects and runs `run`.
+CLI::App* AddCommand(CLI::App& app, const char* name, const char* about, const std::shared_ptr<FarmFlags>& flags,
+                     Command run, const Console& console, int* exit_code) {
+  CLI::App* const command = app.add_subcommand(name, about);
+  command->add_option("--server", flags->connect.address, "the coordinator's HOST:PORT")->capture_default_str();
+  command->add_option("--ca", flags->connect.ca_file, "certificate authority (PEM): turns TLS on");
+  command->add_option("--cert", flags->connect.cert_file, "own certificate, for mutual TLS");
+  command->add_option("--key", flags->connect.key_file, "its private key");
+  command->add_option("--token-file", flags->token_file, "file with the token; else the environment's BAKEWELL_TOKEN");
+  command->callback([flags, run, &console, exit_code] {
+    const bool json = flags->json || flags->bake.json;
+    flags->json = json;
+    const absl::Status status = run(*flags, console);
+    if (!status.ok()) *exit_code = ReportError(status, json ? OutputForm::kJson : OutputForm::kText, console);
+  });
+  return command;
+}
+
+void AddJson(CLI::App* command, FarmFlags& flags) { command->add_flag("--json", flags.json, "one JSON object a line"); }
+
+}  // namespace
+
+void AddFarmCommands(CLI::App& app, const Console& console, int* exit_code) {
+  const auto flags = std::make_shared<FarmFlags>();
+  const auto add = [&](const char* name, const char* about, Command run) {
+    return AddCommand(app, name, about, flags, run, console, exit_code);
+  };
+  CLI::App* submit = add("submit", "Bake a level on the farm", Submit);
+  AddSharedFlags(*submit, flags->bake);
+  AddBakeOnlyFlags(*submit, flags->bake);
+  submit->add_flag("--wait", flags->wait, "wait, and fetch the result into the folder of -o");
+  submit->add_flag("--interactive", flags->interactive, "before every batch job");
+  submit->add_option("--name", flags->name, "for people");
+  submit->add_option("--client-key", flags->client_key, "makes a repeated submit the same job");
+  CLI::App* estimate = add("estimate", "What a bake on the farm would cost", Estimate);
+  AddSharedFlags(*estimate, flags->bake);
+  AddBakeOnlyFlags(*estimate, flags->bake);
+
+  for (const auto& [name, about, run] :
+       {std::tuple{"watch", "Follow a job until it ends", Command(Watch)},
+        std::tuple{"cancel", "End a job; what is done stays known", Command(Cancel)},
+        std::tuple{"fetch", "Fetch a job's files, also partial ones", Command(Fetch)}}) {
+    CLI::App* command = add(name, about, run);
+    command->add_option("job", flags->job, "its number")->required();
+    AddJson(command, *flags);
+    if (run == Command(Fetch)) command->add_option("-o,--output", flags->output, "folder")->capture_default_str();
+  }
+  CLI::App* list = add("list", "Jobs, newest first", List);
+  list->add_option("--user", flags->user, "of this user only");
+  list->add_option("--limit", flags->limit, "how many")->capture_default_str();
+  AddJson(list, *flags);
+  AddJson(add("workers", "Workers that are connected", Workers), *flags);
+}
+
+}  // namespace bakewell

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/artifact/task.h"
+#include "core/base/status.h"
+
+namespace bakewell::level_task {
+
+// The tasks of a bake, as the planner of the coordinator and the executors of the workers agree on them. Inputs and
+// outputs by name:
+//   chart/layout    scene                          -> layout
+//   texel/survey    scene layout                   -> survey
+//   photon/emit     scene layout                   -> flux         range: photon batch begin of end
+//   photon/density  scene layout flux0 flux1 ...   -> cache
+//   gather/tiles    scene layout cache             -> lights       range: tiles [begin, end)
+//   finish/page     scene layout lights0 ...       -> the files of page begin
+//   finish/report   lights0 ...                    -> statistics.json
+// The version of a kind is raised whenever its bytes change for equal inputs.
+struct KindName {
+  const char* kind;
+  uint32_t code_version;
+};
+inline constexpr KindName kChart{"chart/layout", 1};
+inline constexpr KindName kSurvey{"texel/survey", 1};
+inline constexpr KindName kEmit{"photon/emit", 1};
+inline constexpr KindName kDensity{"photon/density", 1};
+inline constexpr KindName kGather{"gather/tiles", 1};
+inline constexpr KindName kFinish{"finish/page", 1};
+inline constexpr KindName kReport{"finish/report", 1};
+
+// TaskSpec::settings of all of them. `settings_json` is proto/settings.h SettingsJson() of the settings that the kind
+// looks at, the others being the defaults.
+struct Settings {
+  std::string settings_json;
+  uint32_t begin = 0, end = 0;
+};
+std::string Serialize(const Settings& settings);
+absl::StatusOr<Settings> ParseSettings(std::string_view bytes);
+
+// What the planner has to know about the texels of a layout.
+struct Survey {
+  uint64_t texels = 0, photons = 0;
+  std::vector<uint32_t> texels_of_tile;    // tile_count
+  std::vector<uint32_t> tile_end_of_page;  // one per page: its tiles end here, and begin where the page before ended
+};
+std::string Serialize(const Survey& survey);
+absl::StatusOr<Survey> ParseSurvey(std::string_view bytes);
+
+}  // namespace bakewell::level_task

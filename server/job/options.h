@@ -1,0 +1,23 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string_view>
+
+#include "server/sched/types.h"
+#include "server/store/tables.h"
+
+namespace bakewell::job {
+
+struct Options {
+  std::filesystem::path folder;  // database and blobs; made if it is missing
+  int64_t quota_bytes = 0;       // of the blob store; 0: none
+  store::AccountRow defaults;    // limits of users without a row of their own
+  sched::Options sched;
+  int io_threads = 8;
+  std::function<sched::Time()> steady_now;    // default: std::chrono::steady_clock
+  std::function<int64_t()> wall_now_us;       // default: std::chrono::system_clock, microseconds since 1970
+  std::function<void(std::string_view)> log;  // one line an event; default: nowhere
+};
+
+}  // namespace bakewell::job

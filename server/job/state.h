@@ -1,0 +1,45 @@
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "server/job/types.h"
+#include "server/plan/plan.h"
+
+// What a Coordinator remembers of tasks, jobs and workers.
+namespace bakewell::job {
+
+struct Task {
+  TaskKey key;
+  TaskSpec spec;
+  TaskOutputs outputs;  // once done
+  int64_t memory_bytes = 0;
+  std::chrono::microseconds cost{0};
+  bool done = false;
+  std::vector<int64_t> jobs;
+};
+struct Phase {
+  int64_t done = 0, total = 0;
+  std::chrono::microseconds left{0};  // estimated, of what is not done
+};
+struct Job {
+  store::JobRow row;
+  std::vector<plan::TaskGraph> stages;  // without the tasks' specs once they are in tasks_
+  std::map<std::string, Phase> phases;
+  int64_t tasks_done = 0;
+  bool changed = true, ending = false;
+};
+struct Worker {
+  WorkerDescription about;
+  LeaseSink sink;
+  uint64_t connection = 0;
+  int credit = 0;
+  bool draining = false;
+  int64_t done = 0, failed = 0;
+  sched::Time seen{0};
+};
+struct Stage {
+  plan::TaskGraph graph;
+  std::vector<std::optional<TaskOutputs>> known;  // by task
+};
+}  // namespace bakewell::job

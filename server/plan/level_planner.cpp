@@ -1,0 +1,223 @@
+#include "server/plan/level_planner.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+
+#include "core/artifact/level_task.h"
+#include "core/scene/canonical.h"
+#include "proto/bakewell/v1/settings.pb.h"
+#include "proto/settings.h"
+
+namespace bakewell::plan {
+
+namespace {
+
+using level_task::KindName;
+using std::chrono::microseconds;
+
+// What a task should take, and measured costs on one core of the build machine (tests/bench has the machine); the
+// scheduler corrects them by what it sees.
+constexpr double kTaskUs = 2e6;
+constexpr double kPhotonUs = 4;
+constexpr double kSampleUs = 2.5;
+constexpr int64_t kTaskBytes = int64_t{256} << 20;  // level, photons and cache of a middling scene
+
+double SamplesOf(Quality quality) {
+  switch (quality) {
+    case Quality::kPreview:
+      return 24;
+    case Quality::kMedium:
+      return 120;
+    case Quality::kHigh:
+      break;
+  }
+  return 900;
+}
+
+// What the planner knows when it makes a task.
+struct Context {
+  Digest scene;
+  TaskKey chart;
+  BakeSettings settings;
+};
+
+// The settings that a kind looks at; the others are defaults, so that they change no key.
+std::string SettingsFor(const KindName& kind, BakeSettings settings) {
+  settings.photon_batches = BakeSettings().photon_batches;
+  const BakeSettings defaults;
+  if (kind.kind == level_task::kChart.kind) {
+    BakeSettings charts;
+    charts.uv = settings.uv;
+    charts.resolution = settings.resolution;
+    charts.texels_per_metre = settings.texels_per_metre;
+    return SettingsJson(charts);
+  }
+  settings.uv = defaults.uv;
+  settings.resolution = defaults.resolution;
+  settings.texels_per_metre = defaults.texels_per_metre;
+  if (kind.kind == level_task::kReport.kind) return SettingsJson(defaults);
+  if (kind.kind == level_task::kGather.kind) return SettingsJson(settings);
+  settings.target_error = defaults.target_error;
+  settings.min_samples = defaults.min_samples;
+  settings.max_samples = defaults.max_samples;
+  return SettingsJson(settings);
+}
+
+PlannedTask MakeTask(const Context& context, const KindName& kind, uint32_t begin, uint32_t end, double cost_us) {
+  PlannedTask task;
+  task.spec.kind = kind.kind;
+  task.spec.code_version = kind.code_version;
+  task.spec.settings = level_task::Serialize({SettingsFor(kind, context.settings), begin, end});
+  task.spec.inputs.push_back({"scene", context.scene});
+  task.cost = microseconds(static_cast<int64_t>(std::max(1000.0, cost_us)));
+  task.memory_bytes = kTaskBytes;
+  return task;
+}
+
+void Need(PlannedTask& task, std::string name, const TaskKey& maker, const char* output) {
+  task.spec.inputs.push_back({std::move(name), OutputOf{maker, output}});
+}
+
+TaskKey Add(TaskGraph& graph, PlannedTask task) {
+  task.key = KeyOf(task.spec);
+  graph.tasks.push_back(std::move(task));
+  return graph.tasks.back().key;
+}
+
+// Tiles [begin, end) of one task.
+struct TileGroup {
+  uint32_t begin, end;
+  double cost_us;
+};
+
+// Consecutive tiles of one page, together about kTaskUs.
+std::vector<TileGroup> GroupTiles(const level_task::Survey& survey, uint32_t begin, uint32_t end, double texel_us) {
+  std::vector<TileGroup> groups;
+  for (uint32_t tile = begin; tile < end; ++tile) {
+    const double cost_us = texel_us * survey.texels_of_tile[tile];
+    if (groups.empty() || groups.back().cost_us + cost_us > kTaskUs) groups.push_back({tile, tile, 0});
+    groups.back().end = tile + 1;
+    groups.back().cost_us += cost_us;
+  }
+  return groups;
+}
+
+TaskKey AddPhotons(const Context& context, const level_task::Survey& survey, TaskGraph& graph) {
+  const double cost_us = kPhotonUs * static_cast<double>(survey.photons);
+  const uint32_t batches = static_cast<uint32_t>(std::clamp(cost_us / kTaskUs, 1.0, 256.0));
+  std::vector<TaskKey> makers;
+  for (uint32_t batch = 0; batch < batches; ++batch) {
+    PlannedTask task = MakeTask(context, level_task::kEmit, batch, batches, cost_us / batches);
+    Need(task, "layout", context.chart, "layout");
+    makers.push_back(Add(graph, std::move(task)));
+  }
+  PlannedTask density = MakeTask(context, level_task::kDensity, 0, 0, cost_us / 4);
+  Need(density, "layout", context.chart, "layout");
+  for (size_t i = 0; i < makers.size(); ++i) Need(density, absl::StrCat("flux", i), makers[i], "flux");
+  return Add(graph, std::move(density));
+}
+
+// The tasks of one page: its tiles, and the page itself. Returns the gather tasks.
+std::vector<TaskKey> AddPage(const Context& context, const std::vector<TileGroup>& groups, uint32_t page,
+                             uint32_t first_tile, const TaskKey& cache, TaskGraph& graph) {
+  std::vector<TaskKey> makers;
+  for (const TileGroup& group : groups) {
+    PlannedTask task = MakeTask(context, level_task::kGather, group.begin, group.end, group.cost_us);
+    Need(task, "layout", context.chart, "layout");
+    Need(task, "cache", cache, "cache");
+    makers.push_back(Add(graph, std::move(task)));
+  }
+  PlannedTask finish = MakeTask(context, level_task::kFinish, page, first_tile, kTaskUs / 4);
+  Need(finish, "layout", context.chart, "layout");
+  for (size_t i = 0; i < makers.size(); ++i) Need(finish, absl::StrCat("lights", i), makers[i], "lights");
+  graph.deliver.push_back(Add(graph, std::move(finish)));
+  return makers;
+}
+
+absl::Status CheckSurvey(const level_task::Survey& survey) {
+  uint32_t last = 0;
+  for (const uint32_t end : survey.tile_end_of_page) {
+    if (end < last || end > survey.texels_of_tile.size()) return absl::DataLossError("the texel survey is broken");
+    last = end;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<level_task::Survey> SurveyFrom(const TaskOutputs& done, const BlobReader& read) {
+  if (done.size() != 1) return absl::InternalError("the texel survey has no result");
+  BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, read(done[0].digest));
+  BAKEWELL_ASSIGN_OR_RETURN(level_task::Survey survey, level_task::ParseSurvey(bytes));
+  BAKEWELL_RETURN_IF_ERROR(CheckSurvey(survey));
+  return survey;
+}
+
+}  // namespace
+
+absl::StatusOr<BakeSettings> ReadSettings(const std::string& bytes) {
+  v1::BakeSettings message;
+  if (!message.ParseFromString(bytes)) return absl::InvalidArgumentError("settings: not a BakeSettings message");
+  if (!message.GetReflection()->GetUnknownFields(message).empty()) {
+    return absl::InvalidArgumentError("settings: some are not known to this coordinator: is the client newer?");
+  }
+  if (message.has_environment()) {
+    return absl::InvalidArgumentError("settings: the environment belongs into the scene that is submitted");
+  }
+  return SettingsFromProto(message, [](const std::string&) -> absl::StatusOr<Environment> {
+    return absl::InvalidArgumentError("settings: a coordinator reads no files");
+  });
+}
+
+std::vector<Kind> LevelPlanner::Kinds() const {
+  std::vector<Kind> kinds;
+  for (const KindName& name : {level_task::kChart, level_task::kSurvey, level_task::kEmit, level_task::kDensity,
+                               level_task::kGather, level_task::kFinish, level_task::kReport}) {
+    kinds.push_back({name.kind, name.code_version});
+  }
+  return kinds;
+}
+
+absl::StatusOr<TaskGraph> LevelPlanner::Plan(const PlanRequest& request, const BlobReader& read) const {
+  Context context{request.scene, {}, {}};
+  BAKEWELL_ASSIGN_OR_RETURN(context.settings, ReadSettings(request.settings));
+  BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, read(request.scene));
+  const auto scene = ParseScene(std::as_bytes(std::span(bytes)));
+  if (!scene.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat("the scene is malformed: ", scene.status().message()));
+  }
+  double triangles = 0;
+  for (const Object& object : scene->objects) triangles += static_cast<double>(object.index.size()) / 3;
+  TaskGraph graph;
+  context.chart = Add(graph, MakeTask(context, level_task::kChart, 0, 0, 50 * triangles));
+  PlannedTask survey = MakeTask(context, level_task::kSurvey, 0, 0, 20 * triangles);
+  Need(survey, "layout", context.chart, "layout");
+  graph.next_stage_after = Add(graph, std::move(survey));
+  return graph;
+}
+
+absl::StatusOr<TaskGraph> LevelPlanner::Continue(const PlanRequest& request, const std::vector<TaskGraph>& so_far,
+                                                 const TaskOutputs& done, const BlobReader& read) const {
+  Context context{request.scene, so_far[0].tasks[0].key, {}};
+  BAKEWELL_ASSIGN_OR_RETURN(context.settings, ReadSettings(request.settings));
+  BAKEWELL_ASSIGN_OR_RETURN(const level_task::Survey survey, SurveyFrom(done, read));
+  const double texel_us = kSampleUs * SamplesOf(context.settings.quality);
+  TaskGraph graph;
+  const TaskKey cache = AddPhotons(context, survey, graph);
+  std::vector<TaskKey> gathers;
+  uint32_t begin = 0;
+  for (uint32_t page = 0; page < survey.tile_end_of_page.size(); ++page) {
+    const uint32_t end = survey.tile_end_of_page[page];
+    const auto makers = AddPage(context, GroupTiles(survey, begin, end, texel_us), page, begin, cache, graph);
+    gathers.insert(gathers.end(), makers.begin(), makers.end());
+    begin = end;
+  }
+  PlannedTask report = MakeTask(context, level_task::kReport, 0, 0, kTaskUs / 100);
+  report.spec.inputs.clear();
+  for (size_t i = 0; i < gathers.size(); ++i) Need(report, absl::StrCat("lights", i), gathers[i], "lights");
+  graph.deliver.push_back(Add(graph, std::move(report)));
+  // Clients write scene.glb with it.
+  graph.artifacts.push_back({"atlas-layout.bin", {context.chart, "layout"}});
+  return graph;
+}
+
+}  // namespace bakewell::plan

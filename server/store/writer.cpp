@@ -1,0 +1,104 @@
+#include "server/store/writer.h"
+
+#include <chrono>
+#include <future>
+
+namespace bakewell::store {
+
+namespace {
+
+constexpr size_t kMaxBatch = 4096;
+constexpr auto kRetryPause = std::chrono::milliseconds(100);
+
+bool WorthRetrying(const absl::Status& status) {
+  return status.code() == absl::StatusCode::kResourceExhausted || status.code() == absl::StatusCode::kUnavailable;
+}
+
+}  // namespace
+
+Writer::Writer(std::unique_ptr<Tables> tables) : tables_(std::move(tables)), thread_([this] { Loop(); }) {}
+
+Writer::~Writer() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+void Writer::Submit(Work work, Done done) {
+  {
+    const std::lock_guard lock(mutex_);
+    queue_.push_back({std::move(work), std::move(done), {}});
+  }
+  backlog_.fetch_add(1, std::memory_order_relaxed);
+  wake_.notify_one();
+}
+
+absl::Status Writer::Run(Work work) {
+  std::promise<absl::Status> promise;
+  Submit(std::move(work), [&](const absl::Status& status) { promise.set_value(status); });
+  return promise.get_future().get();
+}
+
+absl::Status Writer::Trouble() const {
+  const std::lock_guard lock(mutex_);
+  return trouble_;
+}
+
+std::vector<Writer::Item> Writer::TakeBatch() {
+  std::unique_lock lock(mutex_);
+  wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
+  std::vector<Item> batch;
+  const size_t count = std::min(queue_.size(), kMaxBatch);
+  batch.reserve(count);
+  for (size_t i = 0; i < count; ++i) batch.push_back(std::move(queue_[i]));
+  queue_.erase(queue_.begin(), queue_.begin() + count);
+  return batch;
+}
+
+void Writer::Loop() {
+  for (;;) {
+    std::vector<Item> batch = TakeBatch();
+    if (batch.empty()) return;
+    WriteBatch(batch);
+    for (const Item& item : batch) {
+      if (item.done) item.done(item.result);
+    }
+    backlog_.fetch_sub(batch.size(), std::memory_order_relaxed);
+  }
+}
+
+void Writer::WriteBatch(std::vector<Item>& batch) {
+  for (;;) {
+    const absl::Status status = TryBatch(batch);
+    std::unique_lock lock(mutex_);
+    trouble_ = status;
+    if (status.ok()) break;
+    // At the end of the program a disk that is still full costs what nobody has been told is safe.
+    if (!WorthRetrying(status) || stopping_) {
+      for (Item& item : batch) item.result = status;
+      break;
+    }
+    wake_.wait_for(lock, kRetryPause, [this] { return stopping_; });
+  }
+  commits_.fetch_add(1, std::memory_order_relaxed);
+  works_.fetch_add(batch.size(), std::memory_order_relaxed);
+}
+
+absl::Status Writer::TryBatch(std::vector<Item>& batch) {
+  BAKEWELL_RETURN_IF_ERROR(tables_->Begin());
+  for (Item& item : batch) {
+    item.result = tables_->Apart([&] { return item.work(*tables_); });
+    if (WorthRetrying(item.result)) {
+      tables_->Rollback();
+      return item.result;
+    }
+  }
+  const absl::Status committed = tables_->Commit();
+  if (!committed.ok()) tables_->Rollback();
+  return committed;
+}
+
+}  // namespace bakewell::store

@@ -1,0 +1,71 @@
+// A disk that fills up while a job runs: nothing is acknowledged that is not safe, and with space the job goes on.
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+
+#include <fstream>
+
+#include "tests/support/farm.h"
+#include "tests/support/temp_dir.h"
+
+namespace bakewell::test {
+namespace {
+
+// A small tmpfs of the test's own. Needs root, as the build machine has it.
+class SmallDisk {
+ public:
+  explicit SmallDisk(const std::string& size) {
+    ok_ = mount("tmpfs", dir_.path().c_str(), "tmpfs", 0, ("size=" + size).c_str()) == 0;
+  }
+  ~SmallDisk() {
+    if (ok_) umount2(dir_.path().c_str(), MNT_DETACH);
+  }
+  bool ok() const { return ok_; }
+  const std::filesystem::path& path() const { return dir_.path(); }
+
+ private:
+  TempDir dir_;
+  bool ok_ = false;
+};
+
+TEST(FullDisk, JobWaitsForSpaceAndEndsWithTheSameBytes) {
+  const SyntheticScene scene{8, 20, 5000, 0, 8192, 4, true};
+  std::string quiet;
+  {
+    const TempDir dir("/dev/shm");
+    Farm::Options options;
+    options.folder = dir.path();
+    Farm farm(options);
+    farm.AddWorker("w");
+    quiet = DigestsOf(farm.Bake(scene));
+  }
+  const SmallDisk disk("16m");
+  ASSERT_TRUE(disk.ok()) << "cannot mount a tmpfs: run this test as root";
+  Farm::Options options;
+  options.folder = disk.path() / "farm";
+  Farm farm(options);
+  farm.AddWorker("w1");
+  farm.AddWorker("w2");
+  const auto client = farm.Client();
+  const auto job = client->Submit(scene.Text(), {});
+  ASSERT_TRUE(job.ok());
+  ASSERT_TRUE(WaitFor([&] { return client->Get(job->job_id())->tasks_done() > 20; }));
+  {
+    std::ofstream filler(disk.path() / "filler", std::ios::binary);
+    const std::string block(64 << 10, 'x');
+    while (filler.write(block.data(), std::ssize(block)).flush()) {
+    }
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  const int64_t stuck = client->Get(job->job_id())->tasks_done();
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  EXPECT_LE(client->Get(job->job_id())->tasks_done(), stuck + 2);
+  std::filesystem::remove(disk.path() / "filler");
+  const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->state(), v1::DONE) << ended->reason();
+  EXPECT_EQ(DigestsOf(*ended), quiet);
+  EXPECT_TRUE(std::filesystem::is_empty(options.folder / "incoming"));
+}
+
+}  // namespace
+}  // namespace bakewell::test

@@ -1,0 +1,187 @@
+#include "worker/level/codec.h"
+
+#include <bit>
+
+#include "core/base/fields.h"
+
+namespace bakewell {
+
+namespace {
+
+void Put(float value, FieldWriter& writer) { writer.Put(std::bit_cast<uint32_t>(value)); }
+void Put(int64_t value, FieldWriter& writer) { writer.Put(static_cast<uint64_t>(value)); }
+void Put(const Rgb& value, FieldWriter& writer) {
+  for (const float channel : {value.x, value.y, value.z}) Put(channel, writer);
+}
+template <typename T, size_t kCount>
+void Put(const std::array<T, kCount>& values, FieldWriter& writer) {
+  for (const T& value : values) Put(value, writer);
+}
+
+void Get(FieldReader& reader, float& value) { value = std::bit_cast<float>(reader.Get<uint32_t>()); }
+void Get(FieldReader& reader, int64_t& value) { value = static_cast<int64_t>(reader.Get<uint64_t>()); }
+void Get(FieldReader& reader, Rgb& value) {
+  Get(reader, value.x);
+  Get(reader, value.y);
+  Get(reader, value.z);
+}
+template <typename T, size_t kCount>
+void Get(FieldReader& reader, std::array<T, kCount>& values) {
+  for (T& value : values) Get(reader, value);
+}
+
+template <typename T, size_t kCount>
+void Add(const std::array<T, kCount>& from, std::array<T, kCount>& to) {
+  for (size_t i = 0; i < kCount; ++i) to[i] += from[i];
+}
+
+void Put(const PhotonTotals& totals, FieldWriter& writer) {
+  Put(totals.emitted, writer);
+  Put(totals.absorbed, writer);
+  Put(totals.escaped, writer);
+  for (const int64_t value : {totals.rays, totals.deposits, totals.cut_paths}) Put(value, writer);
+}
+
+void AddTotals(FieldReader& reader, PhotonTotals& into) {
+  PhotonTotals totals;
+  Get(reader, totals.emitted);
+  Get(reader, totals.absorbed);
+  Get(reader, totals.escaped);
+  for (int64_t* value : {&totals.rays, &totals.deposits, &totals.cut_paths}) Get(reader, *value);
+  Add(totals.emitted, into.emitted);
+  Add(totals.absorbed, into.absorbed);
+  Add(totals.escaped, into.escaped);
+  into.rays += totals.rays;
+  into.deposits += totals.deposits;
+  into.cut_paths += totals.cut_paths;
+}
+
+void PutTexel(const TexelLight& light, FieldWriter& writer) {
+  Put(light.irradiance, writer);
+  Put(light.sh.lambda, writer);
+  Put(light.variance, writer);
+  Put(light.backface_share, writer);
+  writer.Put(static_cast<uint8_t>(light.valid));
+  writer.Put(static_cast<uint32_t>(light.direct_samples));
+  writer.Put(static_cast<uint32_t>(light.indirect_samples));
+}
+
+TexelLight GetTexel(FieldReader& reader) {
+  TexelLight light;
+  Get(reader, light.irradiance);
+  Get(reader, light.sh.lambda);
+  Get(reader, light.variance);
+  Get(reader, light.backface_share);
+  light.valid = reader.Get<uint8_t>() != 0;
+  light.direct_samples = static_cast<int>(reader.Get<uint32_t>());
+  light.indirect_samples = static_cast<int>(reader.Get<uint32_t>());
+  return light;
+}
+
+constexpr size_t kTexelBytes = 4 * (3 + 27 + 3 + 1) + 1 + 8;
+constexpr size_t kCellBytes = 4 * 6 + 4 * kVarianceGroups + 1;
+
+}  // namespace
+
+std::string SerializePhotons(const PhotonMap& map) {
+  FieldWriter writer;
+  Put(map.totals, writer);
+  writer.Put(static_cast<uint64_t>(map.flux.size()));
+  for (size_t i = 0; i < map.flux.size(); ++i) {
+    const CellFlux& flux = map.flux[i];
+    if (flux.count == 0) continue;
+    writer.Put(static_cast<uint64_t>(i));
+    writer.Put(flux.count);
+    Put(flux.direct, writer);
+    Put(flux.indirect, writer);
+    Put(flux.group, writer);
+  }
+  return std::move(writer).bytes();
+}
+
+absl::Status AddPhotons(std::string_view bytes, PhotonMap& into) {
+  FieldReader reader(bytes);
+  AddTotals(reader, into.totals);
+  if (reader.Get<uint64_t>() != into.flux.size()) return absl::DataLossError("photons: of other cells");
+  while (reader.ok() && reader.remaining() > 0) {
+    const uint64_t index = reader.Get<uint64_t>();
+    CellFlux flux;
+    flux.count = reader.Get<uint32_t>();
+    Get(reader, flux.direct);
+    Get(reader, flux.indirect);
+    Get(reader, flux.group);
+    if (index >= into.flux.size()) return absl::DataLossError("photons: of a cell that is not there");
+    CellFlux& sum = into.flux[index];
+    sum.count += flux.count;
+    Add(flux.direct, sum.direct);
+    Add(flux.indirect, sum.indirect);
+    Add(flux.group, sum.group);
+  }
+  return reader.Finish("photons");
+}
+
+std::string SerializeCache(const RadianceCache& cache) {
+  FieldWriter writer;
+  Put(cache.cell_size_m, writer);
+  Put(cache.photons_seen, writer);
+  Put(cache.rays, writer);
+  writer.Put(static_cast<uint64_t>(cache.irradiance.size()));
+  for (size_t i = 0; i < cache.irradiance.size(); ++i) {
+    Put(cache.irradiance[i].direct, writer);
+    Put(cache.irradiance[i].indirect, writer);
+    Put(cache.group[i], writer);
+    writer.Put(cache.window[i]);
+  }
+  return std::move(writer).bytes();
+}
+
+absl::StatusOr<RadianceCache> ParseCache(std::string_view bytes) {
+  FieldReader reader(bytes);
+  RadianceCache cache;
+  Get(reader, cache.cell_size_m);
+  Get(reader, cache.photons_seen);
+  Get(reader, cache.rays);
+  const uint64_t count = reader.Get<uint64_t>();
+  if (count > reader.remaining() / kCellBytes) return absl::DataLossError("radiance cache: impossible count");
+  cache.irradiance.resize(count);
+  cache.group.resize(count);
+  cache.window.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    Get(reader, cache.irradiance[i].direct);
+    Get(reader, cache.irradiance[i].indirect);
+    Get(reader, cache.group[i]);
+    cache.window[i] = reader.Get<uint8_t>();
+  }
+  BAKEWELL_RETURN_IF_ERROR(reader.Finish("radiance cache"));
+  return cache;
+}
+
+std::string SerializeTiles(const GatheredTiles& tiles) {
+  FieldWriter writer;
+  const GatherCounters& counters = tiles.counters;
+  for (const int64_t value : {counters.gather_rays, counters.shadow_rays, counters.bounce_rays, counters.validity_rays,
+                              counters.bad_samples}) {
+    Put(value, writer);
+  }
+  writer.Put(static_cast<uint64_t>(tiles.lights.size()));
+  for (const TexelLight& light : tiles.lights) PutTexel(light, writer);
+  return std::move(writer).bytes();
+}
+
+absl::StatusOr<GatheredTiles> ParseTiles(std::string_view bytes) {
+  FieldReader reader(bytes);
+  GatheredTiles tiles;
+  GatherCounters& counters = tiles.counters;
+  for (int64_t* value : {&counters.gather_rays, &counters.shadow_rays, &counters.bounce_rays, &counters.validity_rays,
+                         &counters.bad_samples}) {
+    Get(reader, *value);
+  }
+  const uint64_t count = reader.Get<uint64_t>();
+  if (count > reader.remaining() / kTexelBytes) return absl::DataLossError("gathered tiles: impossible count");
+  tiles.lights.reserve(count);
+  for (uint64_t i = 0; i < count; ++i) tiles.lights.push_back(GetTexel(reader));
+  BAKEWELL_RETURN_IF_ERROR(reader.Finish("gathered tiles"));
+  return tiles;
+}
+
+}  // namespace bakewell

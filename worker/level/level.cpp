@@ -1,0 +1,89 @@
+#include "worker/level/level.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/trace/float_mode.h"
+
+namespace bakewell {
+
+namespace {
+
+struct QualityNumbers {
+  int min_samples, max_samples, photons_per_texel;
+  float target_error;
+};
+
+QualityNumbers NumbersOf(Quality quality) {
+  switch (quality) {
+    case Quality::kPreview:
+      return {8, 256, 6, 0.08f};
+    case Quality::kMedium:
+      return {16, 512, 24, 0.04f};
+    case Quality::kHigh:
+      break;
+  }
+  return {32, 4096, 64, 0.015f};
+}
+
+constexpr int64_t kLeastPhotons = 32768;
+
+}  // namespace
+
+// Cells grow in number more slowly than photons, so that both the blur and the noise of the cache go to zero.
+int64_t CellsFor(int64_t photons) {
+  const double root = std::cbrt(static_cast<double>(photons));
+  return std::max<int64_t>(1024, static_cast<int64_t>(4 * root * root));
+}
+
+Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
+  const QualityNumbers numbers = NumbersOf(settings.quality);
+  Budget budget;
+  budget.gather.min_samples = settings.min_samples > 0 ? settings.min_samples : numbers.min_samples;
+  budget.gather.max_samples = settings.max_samples > 0 ? settings.max_samples : numbers.max_samples;
+  budget.gather.min_samples = std::min(budget.gather.min_samples, budget.gather.max_samples);
+  budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
+  budget.gather.seed = settings.seed;
+  const int64_t texel_count = static_cast<int64_t>(texels.texels.size());
+  budget.photons =
+      settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texel_count * numbers.photons_per_texel);
+  return budget;
+}
+
+absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout layout, const BakeSettings& settings) {
+  const FlushDenormals mode;
+  auto level = std::make_shared<Level>();
+  level->scene = std::move(scene);
+  level->layout = std::move(layout);
+  BAKEWELL_ASSIGN_OR_RETURN(level->world, World::Build(level->scene, settings.backfaces, settings.albedo_limit));
+  level->lights = std::make_unique<LightSet>(*level->world, level->scene.environment);
+  level->texels = RasterizeTexels(*level->world, level->layout, settings.footprint);
+  if (level->texels.texels.empty()) {
+    return absl::InvalidArgumentError(
+        "no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");
+  }
+  level->photons = BudgetOf(settings, level->texels).photons;
+  return level;
+}
+
+std::shared_ptr<const PhotonStage> BuildPhotonStage(const Level& level, const BakeSettings& settings) {
+  const int64_t count = level.photons;
+  const int walks = static_cast<int>(std::min<int64_t>(count / 16, 100000));
+  auto stage = std::make_shared<PhotonStage>();
+  stage->guide = EmissionGuide::Learn(*level.world, *level.lights, level.layout, level.texels, walks, settings.seed);
+  stage->plan = PlanPhotons(*level.lights, stage->guide, count, settings.seed);
+  stage->cells = SurfaceCells::Build(*level.world, CellsFor(count));
+  return stage;
+}
+
+float MeanIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache) {
+  double sum = 0;
+  for (const Texel& texel : texels.texels) {
+    const uint32_t triangle = texels.fragments[texel.fragment_begin].triangle;
+    const CellIrradiance& light = cache.irradiance[2 * static_cast<size_t>(cells.CellAt(triangle, texel.position))];
+    sum += static_cast<double>(Luminance(light.direct + light.indirect));
+  }
+  return texels.texels.empty() ? 0 : static_cast<float>(sum / static_cast<double>(texels.texels.size()));
+}
+
+}  // namespace bakewell

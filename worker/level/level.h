@@ -1,0 +1,94 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "core/artifact/settings.h"
+#include "core/base/fields.h"
+#include "worker/gather/tile.h"
+#include "worker/light/select.h"
+
+namespace bakewell {
+
+// Samples, photons and target of a quality, with the settings' own numbers in their place.
+struct Budget {
+  GatherOptions gather;
+  int64_t photons = 0;
+};
+Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels);
+
+// A scene with its charts, ready to be traced. Immutable; made once and shared by the tasks that need it.
+struct Level {
+  Scene scene;
+  AtlasLayout layout;
+  std::unique_ptr<World> world;
+  std::unique_ptr<LightSet> lights;
+  TexelMap texels;
+  int64_t photons = 0;  // to be emitted
+};
+// kInvalidArgument: no lightmapped surface covers a texel.
+absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout layout, const BakeSettings& settings);
+
+// Who emits what, and the cells that photons land in.
+struct PhotonStage {
+  EmissionGuide guide;
+  PhotonPlan plan;
+  SurfaceCells cells;
+};
+std::shared_ptr<const PhotonStage> BuildPhotonStage(const Level& level, const BakeSettings& settings);
+
+// How many cells the photons are stored in.
+int64_t CellsFor(int64_t photons);
+
+// Mean luminance that the photons brought to the fronts of lightmapped surfaces, to judge errors against.
+float MeanIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache);
+
+// Keeps the few values that were asked for last; threads that ask for the same key wait for one to make it.
+template <typename Value>
+class Recent {
+ public:
+  using Made = absl::StatusOr<std::shared_ptr<const Value>>;
+  explicit Recent(size_t capacity) : capacity_(capacity) {}
+  Made Get(const Digest& key, const std::function<Made()>& make) {
+    const std::shared_ptr<Entry> entry = Find(key);
+    const std::lock_guard making(entry->mutex);
+    if (entry->value == nullptr) {
+      Made made = make();
+      if (!made.ok()) return made;
+      entry->value = *std::move(made);
+    }
+    return entry->value;
+  }
+
+ private:
+  struct Entry {
+    std::mutex mutex;
+    std::shared_ptr<const Value> value;
+    uint64_t used = 0;
+  };
+  std::shared_ptr<Entry> Find(const Digest& key) {
+    const std::lock_guard lock(mutex_);
+    std::shared_ptr<Entry>& entry = entries_[key];
+    if (entry == nullptr) entry = std::make_shared<Entry>();
+    entry->used = ++clock_;
+    const std::shared_ptr<Entry> found = entry;
+    while (entries_.size() > capacity_) {
+      auto oldest = entries_.begin();
+      for (auto other = entries_.begin(); other != entries_.end(); ++other) {
+        if (other->second->used < oldest->second->used) oldest = other;
+      }
+      entries_.erase(oldest);
+    }
+    return found;
+  }
+
+  const size_t capacity_;
+  std::mutex mutex_;
+  std::map<Digest, std::shared_ptr<Entry>> entries_;
+  uint64_t clock_ = 0;
+};
+
+}  // namespace bakewell

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <span>
+
+#include "worker/finish/page.h"
+#include "worker/task/executor.h"
+
+namespace bakewell {
+
+// The files of one page, as bytes: lightmap-P.irradiance.exr, .sh.exr, .variance.exr and lightmap-P.png. `lights` holds
+// one element per TexelMap::texels; those of other pages are not looked at. kUnavailable: no room for temporary files.
+absl::StatusOr<MadeOutputs> PageFiles(const TexelMap& map, std::span<const TexelLight> lights, int page);
+
+}  // namespace bakewell

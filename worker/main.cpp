@@ -1,0 +1,6 @@
+#include "worker/cli/program.h"
+#include "worker/level/executor.h"
+
+int main(int argc, char** argv) {
+  return bakewell::RunWorkerProgram(argc, argv, [](int) { return std::make_unique<bakewell::LevelExecutor>(); });
+}
