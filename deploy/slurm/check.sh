@@ -8,6 +8,7 @@ shift 2
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 tools="${BAKEWELL_SLURM_TOOLS:-$here/../../../shared/tools/slurm}"
 dir="$(mktemp -d)"
+chmod 755 "$dir"
 server=0
 stop() {
   kill "$server" 2>/dev/null || true
