@@ -188,29 +188,6 @@ TEST_F(FarmTest, RestartedCoordinatorGoesOnAndWorkersComeBack) {
   EXPECT_GT(ended->tasks_known(), 0);
 }
 
-TEST_F(FarmTest, CorruptedBlobIsMadeAgain) {
-  Farm farm(FastOptions(dir.path()));
-  const std::string quiet = BakeAlone(scene, 1, false);
-  auto& first = farm.AddWorker("first");
-  first.executor.before = [](const TaskSpec& spec) {
-    return spec.kind == "test/join" ? absl::UnavailableError("not me") : absl::OkStatus();
-  };
-  const auto client = farm.Client();
-  const auto job = client->Submit(scene.Text(), {});
-  ASSERT_TRUE(WaitFor([&] { return client->Get(job->job_id())->tasks_done() == 25; }));
-  // Every blob but the scene rots.
-  for (const auto& file : std::filesystem::recursive_directory_iterator(dir.path() / "blobs")) {
-    if (!file.is_regular_file() || file.path().filename() == Sha256Of(scene.Text()).Hex()) continue;
-    std::ofstream(file.path(), std::ios::in | std::ios::out) << "rot";
-  }
-  farm.StopWorkers();
-  farm.AddWorker("second");
-  const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
-  ASSERT_TRUE(ended.ok()) << ended.status();
-  EXPECT_EQ(ended->state(), v1::DONE) << ended->reason();
-  EXPECT_EQ(DigestsOf(*ended), quiet);
-}
-
 TEST_F(FarmTest, DrainedWorkerFinishesAndLeaves) {
   Farm farm(FastOptions(dir.path()));
   auto& worker = farm.AddWorker("w");
