@@ -29,8 +29,9 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
       const LightSample sample = scene.lights.SampleLocal(
           light, texel.position, {UnitFloat(HashCombine(probe_key, 1)), UnitFloat(HashCombine(probe_key, 2))});
       if (MaxComponent(sample.perpendicular) <= 0 || Dot(sample.dir, texel.normal) <= 0) continue;
-      const SurfacePoint point{texel.position, texel.normal,
-                               scene.world.PointAt(map.fragments[texel.fragment_begin].triangle, 0, 0, false).offset};
+      SurfacePoint point = scene.world.PointAt(map.fragments[texel.fragment_begin].triangle, 0, 0, false);
+      point.position = texel.position;
+      point.normal = texel.normal;
       ++tried;
       ++counters.shadow_rays;
       seen += scene.world.Occluded(ShadowRay(point, sample, probe_key)) ? 0 : 1;

@@ -89,7 +89,7 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
     const Frame frame = FrameFromHint(point.normal, scene.world.triangles()[hit.triangle].e1);
     const Vec3f dir = frame.ToWorld(CosineHemisphere({Random(step_key, 8), Random(step_key, 9)}));
     ++counters.bounce_rays;
-    const Hit next = scene.world.Intersect({RayOrigin(point), dir, kInfinity, step_key});
+    const Hit next = scene.world.Intersect(RayFrom(point, dir, kInfinity, step_key));
     throughput = throughput * kPiF;  // cosine lobe: irradiance is pi times the radiance found
     result.radiance += throughput * FoundLight(scene, point, dir, next);
     if (!next) return result;

@@ -54,7 +54,7 @@ class PathTracer {
       irradiance += throughput * Direct(point, bounce == 0 ? under_sun : point, numbers, bounce);
       const Vec3f dir = frame.ToWorld(CosineHemisphere(numbers.Get2(bounce, 2)));
       ++rays_;
-      const Hit hit = world_.Intersect({RayOrigin(point), dir, kInfinity, numbers.RayKey(bounce)});
+      const Hit hit = world_.Intersect(RayFrom(point, dir, kInfinity, numbers.RayKey(bounce)));
       irradiance += throughput * Found(point, dir, hit) * kPiF;
       if (!hit) return irradiance;
       throughput = throughput * world_.AlbedoAt(hit);

@@ -135,7 +135,7 @@ class TileGatherer {
       const float pdf = GatherPdf(local.z);
       const uint32_t ray_key = HashCombine(work.key, 0x80000000u | i);
       ++counters_.gather_rays;
-      const Hit hit = scene_.world.Intersect({RayOrigin(point.surface), dir, kInfinity, ray_key});
+      const Hit hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, ray_key));
       work.backs += MeetsBack(scene_.world, hit) ? 1.0f : 0.0f;
       Rgb radiance = FoundByGather(scene_, work.choice, point.surface.position, dir, pdf, hit);
       if (hit) {

@@ -12,6 +12,7 @@ class EnvironmentLight {
 
   // False where no direction is bright: then nothing else may be called but Radiance.
   bool bright() const { return bright_; }
+  EnvironmentType type() const { return environment_.type; }
   // True where rays drawn over the hemisphere find it well enough without being aimed at its bright parts.
   bool smooth() const { return environment_.type != EnvironmentType::kLatLong; }
 

@@ -91,6 +91,7 @@ LightSample LightSet::SampleTriangle(const EmissiveTriangle& light, Vec3f positi
   sample.pdf = near ? 1 / seen.solid_angle() : distance * distance / (std::fabs(cos_light) * light.area);
   const SurfacePoint end = world_.PointAt(light.triangle, b.x, b.y, cos_light < 0);
   sample.target = RayOrigin(end);
+  sample.target_triangle = light.triangle;
   sample.perpendicular = world_.FrontEmissionAt(light.triangle, b.x, b.y) / sample.pdf;
   return sample;
 }
@@ -210,7 +211,8 @@ float LightSet::Power(int light) const {
 }
 
 Ray ShadowRay(const SurfacePoint& from, const LightSample& sample, uint32_t key) {
-  Ray ray{RayOrigin(from), sample.dir, kInfinity, key};
+  Ray ray = RayFrom(from, sample.dir, kInfinity, key);
+  ray.to = sample.target_triangle;
   if (sample.infinite) return ray;
   const Vec3f to_light = sample.target - ray.origin;
   ray.t_max = Length(to_light);

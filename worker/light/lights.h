@@ -19,6 +19,7 @@ struct EmissiveTriangle {
 struct LightSample {
   Vec3f dir;              // unit, towards the light
   Vec3f target;           // where the shadow ray ends (finite lights)
+  uint32_t target_triangle = kNoTriangle;
   bool infinite = false;  // the shadow ray has no end
   Rgb perpendicular;      // irradiance on a plane facing the light, divided by the pdf of the point [W m^-2]
   float pdf = 0;          // per steradian, given the light; 0 for a delta light

@@ -18,6 +18,7 @@ struct Photon {
   Vec3f origin, dir;
   Rgb flux;  // [W]
   uint32_t key = 0;
+  uint32_t from = kNoTriangle;
 };
 
 // Points on spot cones with a density that follows the falloff: the flat part, then the smooth rim by its cubic CDF.
@@ -49,7 +50,7 @@ Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_p
   return {RayOrigin(point), frame.ToWorld(CosineHemisphere(u_direction)),
           world.FrontEmissionAt(light.triangle, b.x, b.y) *
               static_cast<float>(kPi * static_cast<double>(light.area) * sides / photons),
-          0};
+          0, light.triangle};
 }
 
 // A photon that crosses the square of side 2R behind the scene at `point`.
@@ -87,7 +88,7 @@ class Emitter {
     }
     if (source.kind == PhotonSource::Kind::kSky) {
       const auto sky = guide_.DrawSky(u.Get2(2), u.Get2(0));
-      return FromSquare(world_, SkyFrame(sky.dir), sky.point, lights_.environment().Radiance(sky.dir) / sky.pdf, n);
+      return FromSquare(world_, sky.across, sky.point, lights_.environment().Radiance(sky.dir) / sky.pdf, n);
     }
     if (!lights_.IsEmissive(source.light)) return FromPunctual(lights_.locals()[source.light], u.Get2(0), n);
     const EmissiveTriangle& triangle = lights_.emissive()[static_cast<size_t>(source.light) - lights_.locals().size()];
@@ -111,7 +112,7 @@ class Tracer {
       : world_(world), cells_(cells), scale_(scale), map_(map) {}
 
   void Trace(const Photon& photon, const SobolPoint& u, int group) {
-    Ray ray{photon.origin, photon.dir, kInfinity, photon.key};
+    Ray ray{photon.origin, photon.dir, kInfinity, photon.key, photon.from};
     Rgb flux = photon.flux;
     Accumulate(totals_.emitted, ToFixed(flux));
     for (int bounce = 0;; ++bounce) {
@@ -132,8 +133,8 @@ class Tracer {
       Accumulate(totals_.absorbed, {before[0] - after[0], before[1] - after[1], before[2] - after[2]});
       const Frame frame = FrameFromHint(point.normal, world_.triangles()[hit.triangle].e1);
       const Vec2f scatter{Random(photon, u, bounce, 0), Random(photon, u, bounce, 1)};
-      ray = {RayOrigin(point), frame.ToWorld(CosineHemisphere(scatter)), kInfinity,
-             photon.key + static_cast<uint32_t>(bounce) + 1};
+      ray = RayFrom(point, frame.ToWorld(CosineHemisphere(scatter)), kInfinity,
+                    photon.key + static_cast<uint32_t>(bounce) + 1);
     }
   }
 

@@ -56,7 +56,6 @@ float UsefulShare(const std::vector<float>& marks) {
 
 }  // namespace
 
-Frame SkyFrame(Vec3f dir) { return FrameFromNormal(dir); }
 Frame SunFrame(const PunctualLight& light) { return FrameFromHint(-light.direction, light.tangent); }
 
 struct EmissionGuide::Marks {
@@ -71,7 +70,28 @@ Vec2f OnSquare(const World& world, const Frame& frame, Vec3f p) {
   return {Dot(d, frame.t) / world.radius(), Dot(d, frame.b) / world.radius()};
 }
 
+// The axes that the sky's photons are drawn in follow the geometry as far as the sky's symmetry allows, so that a turned
+// level meets the same photons.
+Frame SkyAxes(const World& world, EnvironmentType type) {
+  const Frame fixed = FrameFromHint({0, 1, 0}, {1, 0, 0});
+  if (type == EnvironmentType::kLatLong || world.triangles().empty()) return fixed;
+  const Triangle& first = world.triangles().front();
+  if (type == EnvironmentType::kConstant) return FrameFromHint(first.normal, first.e1);
+  for (const Triangle& t : world.triangles()) {
+    for (const Vec3f edge : {t.e1, t.e2}) {
+      const Vec3f level{edge.x, 0, edge.z};
+      if (Length(level) > 0.1f * Length(edge)) return FrameFromHint({0, 1, 0}, level);
+    }
+  }
+  return fixed;
+}
+
 }  // namespace
+
+Frame EmissionGuide::SkySquare(Vec3f dir) const {
+  const Frame local = FrameFromNormal(dir);
+  return {SkyToWorld(local.t), SkyToWorld(local.b), SkyToWorld(local.n)};
+}
 
 int EmissionGuide::SkyBin(int x, int y) const {
   return (y * kSkyRows / sky_height_) * kSkyColumns + x * kSkyColumns / sky_width_;
@@ -82,6 +102,7 @@ EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, c
   EmissionGuide guide;
   guide.sky_width_ = lights.environment().width();
   guide.sky_height_ = lights.environment().height();
+  guide.sky_axes_ = SkyAxes(world, lights.environment().type());
   Marks marks;
   marks.sun.assign(lights.directionals().size(), std::vector<float>(kSunGrid * kSunGrid, 0.0f));
   marks.sky.assign(static_cast<size_t>(kSkyColumns) * kSkyRows * kSkyGrid * kSkyGrid, 0.0f);
@@ -91,18 +112,19 @@ EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, c
     for (size_t s = 0; s < lights.directionals().size(); ++s) {
       const PunctualLight& sun = lights.directionals()[s];
       const float cosine = -Dot(sun.direction, point.normal);
-      if (cosine <= 0 || world.Occluded({RayOrigin(point), -sun.direction, kInfinity, key})) continue;
+      if (cosine <= 0 || world.Occluded(RayFrom(point, -sun.direction, kInfinity, key))) continue;
       const Vec2f p = OnSquare(world, SunFrame(sun), point.position);
       marks.sun[s][static_cast<size_t>(Bin(p.y, kSunGrid) * kSunGrid + Bin(p.x, kSunGrid))] += cosine;
     }
   };
-  const auto mark_sky = [&](Vec3f from, Vec3f dir) {
+  const auto mark_sky = [&](Vec3f from, Vec3f dir_ws) {
     if (!lights.environment().bright()) return;
+    const Vec3f dir = guide.SkyToLocal(dir_ws);
     const float phi = std::atan2(dir.z, dir.x) / (2 * kPiF), v = std::acos(std::clamp(dir.y, -1.0f, 1.0f)) / kPiF;
     const int x = std::clamp(static_cast<int>((phi < 0 ? phi + 1 : phi) * static_cast<float>(guide.sky_width_)), 0,
                              guide.sky_width_ - 1);
     const int y = std::clamp(static_cast<int>(v * static_cast<float>(guide.sky_height_)), 0, guide.sky_height_ - 1);
-    const Vec2f p = OnSquare(world, SkyFrame(dir), from);
+    const Vec2f p = OnSquare(world, guide.SkySquare(dir), from);
     marks.sky[static_cast<size_t>((guide.SkyBin(x, y) * kSkyGrid + Bin(p.y, kSkyGrid)) * kSkyGrid +
                                   Bin(p.x, kSkyGrid))] += 1;
   };
@@ -116,7 +138,7 @@ EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, c
     Frame frame = start.frame;
     for (int step = 0; step < kMaxWalk; ++step) {
       const Vec3f dir = frame.ToWorld(CosineHemisphere({random(10 * step + 10), random(10 * step + 11)}));
-      const Hit hit = world.Intersect({RayOrigin(at), dir, kInfinity, key + static_cast<uint32_t>(step)});
+      const Hit hit = world.Intersect(RayFrom(at, dir, kInfinity, key + static_cast<uint32_t>(step)));
       if (!hit) {
         if (step > 0) mark_sky(at.position, dir);
         break;
@@ -180,7 +202,8 @@ EmissionGuide::SkyPoint EmissionGuide::DrawSky(Vec2f u_direction, Vec2f u_positi
   const float s = std::sqrt(std::max(0.0f, 1 - y * y)), phi = cell.position.x * 2 * kPiF;
   const float solid_angle = (top - bottom) * 2 * kPiF / static_cast<float>(sky_width_);
   const float cells = static_cast<float>(sky_width_) * static_cast<float>(sky_height_);
-  SkyPoint point{{s * std::cos(phi), y, s * std::sin(phi)}, cell.pdf / cells / solid_angle, {}};
+  const Vec3f dir{s * std::cos(phi), y, s * std::sin(phi)};
+  SkyPoint point{SkyToWorld(dir), SkySquare(dir), cell.pdf / cells / solid_angle, {}};
   point.point = Draw(sky_position_[static_cast<size_t>(SkyBin(cell.x, cell.y))], u_position);
   return point;
 }

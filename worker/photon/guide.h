@@ -30,6 +30,7 @@ class EmissionGuide {
   SquarePoint DrawSun(int directional, Vec2f u) const { return Draw(sun_[directional], u); }
   struct SkyPoint {
     Vec3f dir;      // unit, towards the sky
+    Frame across;   // of the square behind the scene, n = dir
     float pdf = 0;  // per steradian
     SquarePoint point;
   };
@@ -43,6 +44,10 @@ class EmissionGuide {
   struct Marks;
   static SquarePoint Draw(const Distribution2D& table, Vec2f u);
   int SkyBin(int x, int y) const;
+  Vec3f SkyToWorld(Vec3f v) const { return sky_axes_.t * v.x + sky_axes_.n * v.y - sky_axes_.b * v.z; }
+  Vec3f SkyToLocal(Vec3f v) const { return {Dot(v, sky_axes_.t), Dot(v, sky_axes_.n), -Dot(v, sky_axes_.b)}; }
+  // Frame across unit `dir`, given in the sky's axes.
+  Frame SkySquare(Vec3f dir) const;
   void Finish(const LightSet& lights, const Marks& marks);
   void FinishSky(const EnvironmentLight& sky, const Marks& marks);
 
@@ -51,11 +56,11 @@ class EmissionGuide {
   Distribution2D sky_direction_;              // over the environment's table
   std::vector<Distribution2D> sky_position_;  // per direction bin
   int sky_width_ = 1, sky_height_ = 1;
+  Frame sky_axes_;  // n: up, t: azimuth 0
   float sky_useful_ = 1;
 };
 
-// Emission frame across unit `dir` (towards the light) for the sky; the sun uses its own tangent.
-Frame SkyFrame(Vec3f dir);
+// The square of a sun's photons; it turns with the light's node.
 Frame SunFrame(const PunctualLight& light);
 
 }  // namespace bakewell

@@ -59,7 +59,7 @@ void TexelSampler::AddFragment(const World& world, const AtlasLayout& layout, co
 
 void TexelSampler::AddSide(const World& world, uint32_t triangle, Vec3d per_x, Vec3d per_y) {
   const SurfacePoint point = world.PointAt(triangle, 0, 0, false);
-  sides_.push_back({FrameFromHint(point.normal, ToFloat(NormalizeOrZero(per_x))), point.offset});
+  sides_.push_back({FrameFromHint(point.normal, ToFloat(NormalizeOrZero(per_x))), point.offset, triangle});
   radius_ = std::max(radius_, static_cast<float>(0.5 * std::max(Length(per_x + per_y), Length(per_x - per_y))));
 }
 
@@ -154,10 +154,11 @@ TexelPoint TexelSampler::PointAt(Place place) const {
   const Part& part = *place.part;
   const Side& side = sides_[part.side];
   TexelPoint point;
-  point.surface = {part.p0 + part.e1 * place.b.x + part.e2 * place.b.y, side.frame.n, side.offset};
+  point.surface = {part.p0 + part.e1 * place.b.x + part.e2 * place.b.y, side.frame.n, side.offset, side.triangle};
   point.frame = side.frame;
   if (moved_) {
     point.surface.position = moved_to_;
+    point.surface.triangle = kNoTriangle;
   } else if (valid_mask_ != 0xffff) {
     point.valid = valid_mask_ >> MaskBit(place) & 1;
   }

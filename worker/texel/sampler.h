@@ -55,6 +55,7 @@ class TexelSampler {
   struct Side {
     Frame frame;
     float offset;
+    uint32_t triangle;
   };
   struct Place {
     const Part* part;

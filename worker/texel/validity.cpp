@@ -17,7 +17,7 @@ float BackShare(const World& world, const SurfacePoint& from, const Frame& frame
   int backs = 0;
   for (int i = 0; i < count; ++i) {
     const Vec3f dir = frame.ToWorld(CosineHemisphere(set.At(static_cast<uint32_t>(i)).Get2(0)));
-    backs += MeetsBack(world, world.Intersect({RayOrigin(from), dir, kInfinity, set.key()})) ? 1 : 0;
+    backs += MeetsBack(world, world.Intersect(RayFrom(from, dir, kInfinity, set.key()))) ? 1 : 0;
   }
   rays += count;
   return static_cast<float>(backs) / static_cast<float>(count);
@@ -30,7 +30,7 @@ std::array<Vec3f, 4> Tangents(const Frame& frame) { return {frame.t, -frame.t, f
 bool Crowded(const World& world, const TexelPoint& center, float radius, int& rays) {
   for (const Vec3f dir : Tangents(center.frame)) {
     ++rays;
-    if (world.Intersect({RayOrigin(center.surface), dir, radius, 0})) return true;
+    if (world.Intersect(RayFrom(center.surface, dir, radius, 0))) return true;
   }
   return false;
 }
@@ -59,7 +59,7 @@ bool PushOut(const World& world, TexelSampler& sampler, const SobolSet& set, Tex
   const float reach = 2 * sampler.radius();
   for (const Vec3f dir : Tangents(center.frame)) {
     ++result.rays;
-    const Hit hit = world.Intersect({RayOrigin(center.surface), dir, reach, 0});
+    const Hit hit = world.Intersect(RayFrom(center.surface, dir, reach, 0));
     if (!MeetsBack(world, hit)) continue;
     SurfacePoint moved = center.surface;
     moved.position += dir * (hit.t * 1.001f + 4 * moved.offset);

@@ -23,7 +23,7 @@ struct World::Device {
 struct World::TraceContext {
   RTCIntersectContext rtc;
   const World* world;
-  uint32_t key;
+  const Ray* ray;
 };
 
 World::World(const Scene& scene, BackfaceMode backfaces, float albedo_limit)
@@ -59,6 +59,14 @@ bool IsOpaque(const Material& material, BackfaceMode backfaces) {
   return material.alpha_mode == AlphaMode::kOpaque && (backfaces != BackfaceMode::kPass || material.double_sided);
 }
 
+// True where rounding tilts the plane that Embree intersects by more than SurfacePoint::offset allows for: the cross
+// product of two edges is off by about 2^-23 |e1| |e2|.
+bool IsNeedle(const Triangle& t) {
+  constexpr double kMostSlender = 32;
+  const double edges = static_cast<double>(Length(t.e1)) * static_cast<double>(Length(t.e2));
+  return edges > kMostSlender * Length(Cross(ToDouble(t.e1), ToDouble(t.e2)));
+}
+
 }  // namespace
 
 absl::Status World::BuildTriangles() {
@@ -72,11 +80,12 @@ absl::Status World::BuildTriangles() {
   for (const bool opaque : {true, false}) {
     for (uint32_t o = 0; o < scene_.objects.size(); ++o) {
       const Object& object = scene_.objects[o];
-      if (IsOpaque(scene_.materials[object.material], backfaces_) != opaque) continue;
+      const bool object_opaque = IsOpaque(scene_.materials[object.material], backfaces_);
       for (uint32_t k = 0; k < object.index.size() / 3; ++k) {
         Triangle triangle;
         triangle.object = o;
-        if (MakeTriangle(object, k, triangle)) triangles_.push_back(triangle);
+        if (!MakeTriangle(object, k, triangle)) continue;
+        if ((object_opaque && !IsNeedle(triangle)) == opaque) triangles_.push_back(triangle);
       }
     }
     if (opaque) opaque_count_ = static_cast<uint32_t>(triangles_.size());
@@ -135,11 +144,13 @@ void World::Filter(const RTCFilterFunctionNArguments* arguments) {
   BAKEWELL_CHECK(arguments->N == 1);
   if (*arguments->valid == 0) return;
   const auto* context = reinterpret_cast<const TraceContext*>(arguments->context);
-  const auto* ray = reinterpret_cast<const RTCRay*>(arguments->ray);
   const auto* hit = reinterpret_cast<const RTCHit*>(arguments->hit);
   const uint32_t triangle = context->world->opaque_count_ + hit->primID;
-  const Vec3f dir{ray->dir_x, ray->dir_y, ray->dir_z};
-  if (context->world->Passes(triangle, hit->u, hit->v, dir, context->key)) *arguments->valid = 0;
+  const Ray& asked = *context->ray;
+  if (triangle == asked.from || triangle == asked.to ||
+      context->world->Passes(triangle, hit->u, hit->v, asked.dir, asked.key)) {
+    *arguments->valid = 0;
+  }
 }
 
 bool World::Passes(uint32_t triangle, float u, float v, Vec3f dir, uint32_t key) const {
@@ -160,7 +171,7 @@ Hit World::Intersect(const Ray& ray) const {
   TraceContext context;
   rtcInitIntersectContext(&context.rtc);
   context.world = this;
-  context.key = ray.key;
+  context.ray = &ray;
   RTCRayHit query;
   query.ray = {ray.origin.x, ray.origin.y, ray.origin.z, 0, ray.dir.x, ray.dir.y, ray.dir.z, 0, ray.t_max, ~0u, 0, 0};
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -180,7 +191,7 @@ bool World::Occluded(const Ray& ray) const {
   TraceContext context;
   rtcInitIntersectContext(&context.rtc);
   context.world = this;
-  context.key = ray.key;
+  context.ray = &ray;
   RTCRay query{ray.origin.x, ray.origin.y, ray.origin.z, 0, ray.dir.x, ray.dir.y, ray.dir.z, 0, ray.t_max, ~0u, 0, 0};
   rtcOccluded1(device_->scene, &context.rtc, &query);
   return query.tfar < 0;
@@ -202,6 +213,7 @@ SurfacePoint World::PointAt(uint32_t triangle, float u, float v, bool back) cons
   point.position = t.p0 + t.e1 * u + t.e2 * v;
   point.normal = back ? -t.normal : t.normal;
   point.offset = kOffsetRelative * (MaxAbs(t.p0) + MaxAbs(t.e1) + MaxAbs(t.e2));
+  point.triangle = triangle;
   return point;
 }
 

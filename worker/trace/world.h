@@ -21,14 +21,15 @@ struct Triangle {
   uint16_t material = 0;
 };
 
+inline constexpr uint32_t kNoTriangle = ~0u;
+
 struct Ray {
   Vec3f origin;
-  Vec3f dir;         // unit
-  float t_max;       // [m], infinity allowed
-  uint32_t key = 0;  // decides what a BLEND surface lets through
+  Vec3f dir;                                    // unit
+  float t_max;                                  // [m], infinity allowed
+  uint32_t key = 0;                             // decides what a BLEND surface lets through
+  uint32_t from = kNoTriangle, to = kNoTriangle;  // the triangles that it starts and ends on, if any: never hit
 };
-
-inline constexpr uint32_t kNoTriangle = ~0u;
 
 // The first surface along a ray; triangle == kNoTriangle where there is none.
 struct Hit {
@@ -44,6 +45,7 @@ struct SurfacePoint {
   Vec3f position;
   Vec3f normal;      // unit, geometric, on the side that is meant
   float offset = 0;  // how far along `normal` a ray must start to miss its own surface [m]
+  uint32_t triangle = kNoTriangle;
 };
 
 // The scene as Embree sees it. Immutable after Build and safe to trace from any number of threads. Degenerate and
@@ -91,7 +93,7 @@ class World {
   const Scene& scene_;
   BackfaceMode backfaces_;
   float albedo_limit_;
-  std::vector<Triangle> triangles_;  // opaque ones first
+  std::vector<Triangle> triangles_;  // those that stop every ray first, then those that Filter is asked about
   uint32_t opaque_count_ = 0;
   Vec3f center_;
   float radius_ = 0;
@@ -101,6 +103,11 @@ class World {
 // Where a ray that leaves `point` along its side's normal starts. The offset is an error bound of the position and of
 // the intersection (Wächter & Binder 2019, "A Fast and Robust Method for Avoiding Self-Intersection"), relative to the
 // triangle's coordinates: no absolute epsilon.
+// Needles, whose plane rounding tilts by more than that, are told apart by number (Ray::from).
 inline Vec3f RayOrigin(const SurfacePoint& point) { return point.position + point.normal * point.offset; }
+
+inline Ray RayFrom(const SurfacePoint& point, Vec3f dir, float t_max, uint32_t key) {
+  return {RayOrigin(point), dir, t_max, key, point.triangle};
+}
 
 }  // namespace bakewell
