@@ -1,16 +1,18 @@
 #!/usr/bin/python3
-"""Time against error on the scenes of ../shared/reference: bakewell at several budgets, and its own path tracer.
+"""Time against error on the scenes of ../shared/reference: bakewell at several budgets, its own path tracer, and Blender's Cycles.
 
 converge.py [--quick] [--scenes cornell office manylights] [--out FOLDER]
 
 Per row: CPU seconds, rays, relRMSE (against noise: the cross measure of two reference halves), p95, bias. Then the CPU seconds
 that each needs to reach 10, 5, 3, 2 and 1 % (interpolated on the log-log curve; beyond the curve's end along a slope of -1/2,
-marked ~), the ratio of the two, and the z-test of the path tracer against the reference. Writes table.md, results.json and
-plots (where matplotlib is installed). BAKEWELL_PROGRAM names another program than build/release/bin/bakewell."""
+marked ~), the ratios, and the z-test of the path tracer against the reference. Cycles bakes the same texels in the same session
+(Debian package blender; left out with a remark where it is not installed). Writes table.md, results.json and plots (where matplotlib
+is installed). BAKEWELL_PROGRAM names another program than build/release/bin/bakewell."""
 import argparse
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -39,7 +41,6 @@ class Scene:
         self.level = at("scenes", name + ".glb")
         self.mask = (load(at("masks", name + ".png"))[..., 0] > 0.99) & (load(at("masks", name + "_backface.exr"))[..., 0] < 0.02)
         self.mean, self.a, self.b = [load(at("reference", name + suffix + ".exr"))[..., :3] @ LUMINANCE for suffix in ("", "_A", "_B")]
-        self.stderr = load(at("reference", name + "_stderr.exr"))[..., 0]
 
     def figures(self, path):
         value = (load(path)[..., :3] @ LUMINANCE)[self.mask]
@@ -52,12 +53,21 @@ class Scene:
         }
 
     def z_test(self, folder):
-        """Squared z-scores of a path-traced reference against the other: their median, which is 0.455 for standard normal ones."""
+        """z-scores of a path-traced reference against the other, over blocks of 8 x 8 texels. The other's standard error comes from two
+        halves, one degree of freedom a texel (a quotient by it has a median square of 1, not 0.455), and single texels of a path
+        tracer have heavy tails; sums over a block have neither trouble."""
         value = load(os.path.join(folder, "reference-0.irradiance.exr"))[..., :3] @ LUMINANCE
         error = load(os.path.join(folder, "reference-0.stderr.exr"))[..., 0]
-        variance = (error ** 2 + self.stderr ** 2)[self.mask]
-        z = (value - self.mean)[self.mask][variance > 0] / np.sqrt(variance[variance > 0])
-        return {"median_z2": float(np.median(z ** 2)), "mean_z": float(z.mean()), "beyond_3": float((np.abs(z) > 3).mean())}
+        count = self.blocks(np.ones(value.shape))
+        full = count >= 0.5 * count.max()
+        variance = self.blocks((self.a - self.b) ** 2 / 4 + error ** 2)[full]
+        z = self.blocks(value - self.mean)[full][variance > 0] / np.sqrt(variance[variance > 0])
+        return {"blocks": int(z.size), "median_z2": float(np.median(z ** 2)), "mean_z2": float((z ** 2).mean()), "beyond_3": float((np.abs(z) > 3).mean())}
+
+    def blocks(self, value, side=8):
+        """Sums of `value` over the measured texels of each block."""
+        height, width = value.shape
+        return np.where(self.mask, value, 0).reshape(height // side, side, width // side, side).sum((1, 3))
 
 
 def run(command, level, folder, options):
@@ -82,9 +92,57 @@ def measure(scene, label, command, options, keep=None):
     return row
 
 
+def run_cycles(script, level, bakes):
+    """Cycles' bakes of a level, [(samples a texel, seed, file)]. Returns the CPU seconds of each, without Blender's start."""
+    with tempfile.TemporaryDirectory() as folder:
+        job = {"glb": level, "threads": 2, "camera": None, "log": os.path.join(folder, "log"),
+               "bakes": [{"spp": n, "seed": seed, "out": path} for n, seed, path in bakes]}
+        with open(os.path.join(folder, "job.json"), "w", encoding="utf-8") as file:
+            json.dump(job, file)
+        words = ["blender", "-b", "--factory-startup", "--python", script, "--", file.name]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if not os.path.exists(job["log"]):
+            sys.exit(" ".join(words) + "\n" + done.stdout + done.stderr)
+        with open(job["log"], encoding="utf-8") as file:
+            return [json.loads(line)["cpu_s"] for line in file]
+
+
+def bake_with_cycles(scene, counts):
+    if shutil.which("blender") is None:
+        print("no rows of Cycles: install the package blender", flush=True)
+        return []
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        out = [os.path.join(folder, f"{n}.exr") for n in counts]
+        seconds = run_cycles(os.path.join(REFERENCE, "cycles_bake.py"), scene.level, [(n, 1001, path) for n, path in zip(counts, out)])
+        for n, path, cpu in zip(counts, out, seconds):
+            rows.append({"scene": scene.name, "who": f"Cycles {n} spp", "cpu_s": cpu, "rays": None, "estimated": None, **scene.figures(path)})
+            print(format_row(rows[-1]), flush=True)
+    return rows
+
+
+def examine_cornell():
+    """cornell against Cycles without light sampling: whose are the 0.35 % by which everybody is above the reference?"""
+    scene = Scene("cornell")
+    texels = scene.mask.sum()
+    with tempfile.TemporaryDirectory() as folder:
+        halves = [os.path.join(folder, name) for name in ("a.exr", "b.exr")]
+        run_cycles(os.path.join(os.path.dirname(os.path.abspath(__file__)), "cycles_path_hits.py"), scene.level, [(4096, seed, path) for seed, path in zip((7, 8), halves)])
+        a, b = [load(path)[..., :3] @ LUMINANCE for path in halves]
+        noise = np.sqrt(((a - b) ** 2 / 4)[scene.mask].mean() / texels) / scene.mean[scene.mask].mean()
+        print(f"Cycles, path hits only, against the reference: {100 * (((a + b) / 2)[scene.mask].mean() / scene.mean[scene.mask].mean() - 1):+.2f} % +- {100 * noise:.2f} %")
+        scene.a, scene.b, scene.mean = a, b, (a + b) / 2
+        run("bake", scene.level, folder, ["--quality", "high"])
+        print(f"bakewell high against Cycles, path hits only: {100 * scene.figures(os.path.join(folder, 'lightmap-0.irradiance.exr'))['bias']:+.2f} %")
+        run("reference", scene.level, folder, ["--spp", "1024"])
+        print("path tracer against Cycles, path hits only:", scene.z_test(folder))
+
+
 def format_row(r):
-    return (f"| {r['scene']} | {r['who']} | {r['cpu_s']:.2f} | {r['rays'] / 1e6:.1f} | {100 * r['relRMSE']:.2f} | "
-            f"{100 * r['p95']:.1f} | {100 * r['bias']:+.2f} | {100 * r['estimated']:.2f} |")
+    rays = "" if r["rays"] is None else f"{r['rays'] / 1e6:.1f}"
+    estimated = "" if r["estimated"] is None else f"{100 * r['estimated']:.2f}"
+    return (f"| {r['scene']} | {r['who']} | {r['cpu_s']:.2f} | {rays} | {100 * r['relRMSE']:.2f} | "
+            f"{100 * r['p95']:.1f} | {100 * r['bias']:+.2f} | {estimated} |")
 
 
 def seconds_to(rows, target):
@@ -114,26 +172,31 @@ def bench_scene(name, quick):
     fixed = [measure(scene, *budget) for budget in budgets(quick)]
     qualities = [measure(scene, f"bakewell {q}", "bake", ["--quality", q]) for q in ("preview", "medium", "high")]
     paths = [measure(scene, f"reference {n} spp", "reference", ["--spp", str(n)]) for n in ((64, 256) if quick else (64, 256, 1024))]
-    return {"fixed": fixed, "quality": qualities, "reference": paths}
+    cycles = bake_with_cycles(scene, (16, 64) if quick else (16, 64, 256))
+    return {"fixed": fixed, "quality": qualities, "reference": paths, "cycles": cycles}
 
 
 def table(results):
     lines = ["| scene | who | CPU s | Mrays | relRMSE % | p95 % | bias % | own estimate % |", "|---|---|---|---|---|---|---|---|"]
     for groups in results.values():
         lines += [format_row(r) for rows in groups.values() for r in rows]
-    lines += ["", "CPU seconds to an error (~: extrapolated along a slope of -1/2), and path tracer / bakewell:", "",
-              "| scene | error | bakewell, fixed N | bakewell, qualities | path tracer | ratio |", "|---|---|---|---|---|---|"]
+    lines += ["", "CPU seconds to an error (~: extrapolated along a slope of -1/2), and how many times more the others need than bakewell:", "",
+              "| scene | error | bakewell, fixed N | bakewell, qualities | path tracer | ratio | Cycles | ratio |", "|---|---|---|---|---|---|---|---|"]
     for name, groups in results.items():
         for target in TARGETS:
-            cells = [seconds_to(groups[g], target) for g in ("fixed", "quality", "reference")]
-            text = [("~" if outside else "") + f"{t:.2f}" for t, outside in cells]
-            best = min([t for t, outside in cells[:2] if not outside] or [cells[1][0]])
-            lines.append(f"| {name} | {100 * target:.0f} % | {text[0]} | {text[1]} | {text[2]} | {cells[2][0] / best:.0f} |")
-    lines += ["", "Slope of log error over log rays at fixed N (-0.5 is Monte Carlo), and the path tracer's z-scores against the reference "
-              "(median of z^2: 0.455 where both standard errors are right; above 3: 0.27 %):", "", "| scene | slope | median z^2 | mean z | beyond 3 |", "|---|---|---|---|---|"]
+            fixed, quality, paths = [seconds_to(groups[g], target) for g in ("fixed", "quality", "reference")]
+            cycles = seconds_to(groups["cycles"], target) if groups["cycles"] else None
+            best = min([t for t, outside in (fixed, quality) if not outside] or [quality[0]])
+            text = [("~" if outside else "") + f"{t:.2f}" for t, outside in (fixed, quality, paths)]
+            text.append(f"{paths[0] / best:.0f}")
+            text += [("~" if cycles[1] else "") + f"{cycles[0]:.0f}", f"{cycles[0] / best:.0f}"] if cycles else ["", ""]
+            lines.append(f"| {name} | {100 * target:.0f} % | " + " | ".join(text) + " |")
+    lines += ["", "Slope of log error over log rays at fixed N (-0.5 is Monte Carlo), and the path tracer's z-scores against the reference over blocks of 8 x 8 texels "
+              "(where both standard errors are right: median of z^2 0.455, mean 1, beyond 3 0.27 %):", "",
+              "| scene | slope | blocks | median z^2 | mean z^2 | beyond 3 |", "|---|---|---|---|---|---|"]
     for name, groups in results.items():
         z = groups["reference"][-1]["z"]
-        lines.append(f"| {name} | {slope(groups['fixed']):.2f} | {z['median_z2']:.3f} | {z['mean_z']:+.3f} | {100 * z['beyond_3']:.2f} % |")
+        lines.append(f"| {name} | {slope(groups['fixed']):.2f} | {z['blocks']} | {z['median_z2']:.3f} | {z['mean_z2']:.3f} | {100 * z['beyond_3']:.2f} % |")
     return "\n".join(lines) + "\n"
 
 
@@ -147,7 +210,8 @@ def plot(results, folder):
         return
     figure, axes = plt.subplots(1, len(results), figsize=(5 * len(results), 4), squeeze=False)
     for axis, (name, groups) in zip(axes[0], results.items()):
-        for label, rows in (("bakewell, fixed N", groups["fixed"]), ("bakewell, qualities", groups["quality"]), ("path tracer", groups["reference"])):
+        for label, group in (("bakewell, fixed N", "fixed"), ("bakewell, qualities", "quality"), ("path tracer", "reference"), ("Cycles", "cycles")):
+            rows = groups[group]
             axis.loglog([r["cpu_s"] for r in rows], [r["relRMSE"] for r in rows], "o-", label=label)
         axis.set(title=name, xlabel="CPU seconds", ylabel="relRMSE (cross)")
         axis.grid(True, which="both", alpha=0.3)
@@ -160,9 +224,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer budgets, some minutes in all")
     parser.add_argument("--scenes", nargs="+", default=["cornell", "office", "manylights"])
+    parser.add_argument("--path-hits", action="store_true", help="only: Cycles on cornell without light sampling, to see its own bias")
     parser.add_argument("--out", default=os.path.join(ROOT, "build", "bench", "converge"))
     arguments = parser.parse_args()
     os.makedirs(arguments.out, exist_ok=True)
+    if arguments.path_hits:
+        examine_cornell()
+        return
     results = {name: bench_scene(name, arguments.quick) for name in arguments.scenes}
     text = table(results)
     commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False).stdout.strip()
