@@ -145,6 +145,7 @@ v1::BakeSettings ProtoFromSettings(const BakeSettings& settings) {
   message.set_photon_batches(settings.photon_batches);
   message.set_albedo_limit(settings.albedo_limit);
   message.set_footprint(settings.footprint);
+  message.set_filter(settings.filter);
   message.set_seed(settings.seed);
   if (settings.environment) *message.mutable_environment() = ProtoEnvironment(*settings.environment);
   return message;
@@ -164,6 +165,7 @@ absl::StatusOr<BakeSettings> SettingsFromProto(const v1::BakeSettings& message, 
   if (message.has_photon_batches()) settings.photon_batches = message.photon_batches();
   if (message.has_albedo_limit()) settings.albedo_limit = message.albedo_limit();
   if (message.has_footprint()) settings.footprint = message.footprint();
+  if (message.has_filter()) settings.filter = message.filter();
   settings.seed = message.seed();
   if (message.has_environment()) {
     BAKEWELL_ASSIGN_OR_RETURN(settings.environment, EnvironmentOf(message.environment(), read_latlong));

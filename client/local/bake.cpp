@@ -134,10 +134,12 @@ void AddBakeFigures(const BakedTexels& baked, Manifest& manifest) {
   counters["gather/shadow_rays"] = baked.counters.shadow_rays;
   counters["gather/bounce_rays"] = baked.counters.bounce_rays;
   counters["gather/bad_samples"] = baked.counters.bad_samples;
+  counters["filter/rays"] = baked.counters.filter_rays;
+  counters["filter/texels"] = baked.filter.filtered;
   counters["texels/validity_rays"] = baked.counters.validity_rays;
   manifest.photons = baked.photons;
   manifest.rays = baked.photon_rays + baked.density_rays + baked.counters.gather_rays + baked.counters.shadow_rays +
-                  baked.counters.bounce_rays + baked.counters.validity_rays;
+                  baked.counters.bounce_rays + baked.counters.validity_rays + baked.counters.filter_rays;
   manifest.estimated_error = EstimatedError(baked.lights);
 }
 

@@ -7,6 +7,7 @@
 #include "client/gltf/level.h"
 #include "client/local/bake.h"
 #include "core/artifact/manifest.h"
+#include "worker/finish/filter.h"
 #include "worker/level/level.h"
 
 namespace bakewell {
@@ -42,6 +43,7 @@ absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings
 struct BakedTexels {
   std::vector<TexelLight> lights;
   GatherCounters counters;
+  FilterCounters filter;
   int64_t photons = 0, photon_rays = 0, density_rays = 0, cells = 0;
 };
 

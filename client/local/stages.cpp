@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "client/local/level_bake.h"
+#include "worker/finish/filter.h"
 #include "worker/trace/float_mode.h"
 
 namespace bakewell {
@@ -14,6 +15,7 @@ void Add(const GatherCounters& from, GatherCounters& to) {
   to.shadow_rays += from.shadow_rays;
   to.bounce_rays += from.bounce_rays;
   to.validity_rays += from.validity_rays;
+  to.filter_rays += from.filter_rays;
   to.bad_samples += from.bad_samples;
 }
 
@@ -84,6 +86,15 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
   });
   clock.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
+  if (settings.filter) {
+    clock.Begin("filter");
+    const int pages = static_cast<int>(prepared.texels.pages.size());
+    for (int page = 0; page < pages; ++page) {
+      FilterPage(prepared.texels, page, baked.lights, baked.filter);
+      progress.Report("filter", page + 1, pages);
+    }
+    clock.End();
+  }
   return baked;
 }
 

@@ -15,7 +15,7 @@ struct GatherScene {
 };
 
 struct GatherCounters {
-  int64_t gather_rays = 0, shadow_rays = 0, bounce_rays = 0, validity_rays = 0, bad_samples = 0;
+  int64_t gather_rays = 0, shadow_rays = 0, bounce_rays = 0, validity_rays = 0, filter_rays = 0, bad_samples = 0;
 };
 
 // Light that one gather ray brings back.

@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 
+#include "worker/filter/window.h"
 #include "worker/gather/direct.h"
 #include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
@@ -38,6 +39,7 @@ struct Work {
   TileLights::Choice choice{};
   uint32_t key = 0;
   bool valid = true;
+  uint8_t open = 0;
   float backs = 0, backface_share = 0;  // gather rays that met a back face; their share
   bool direct_active = true, indirect_active = true;
   Accumulator direct{}, indirect{};
@@ -55,6 +57,7 @@ class TileGatherer {
     Prepare(layout);
     Round(0, static_cast<uint32_t>(options_.min_samples));
     for (size_t i = 0; i < work_.size(); ++i) Validate(map_.texels[begin_ + i], work_[i]);
+    if (options_.filter) Connect();
     Decide();
     for (int done = options_.min_samples; done < options_.max_samples; done *= 2) {
       if (!Round(static_cast<uint32_t>(done), static_cast<uint32_t>(2 * done))) break;
@@ -172,10 +175,79 @@ class TileGatherer {
     return count > 0 ? sum / static_cast<float>(count) : 0;
   }
 
+  // The tile and as much around it as a filter's window reaches. What lies outside has no values yet, only places.
+  void Connect() {
+    const Texel& first = map_.texels[begin_];
+    constexpr int kMargin = SmoothGrid::kMostRadius;
+    left_ = first.x / kTileSide * kTileSide - kMargin;
+    top_ = first.y / kTileSide * kTileSide - kMargin;
+    const PageSize page = map_.pages[first.page];
+    for (int y = 0; y < grid_.height(); ++y) {
+      for (int x = 0; x < grid_.width(); ++x) {
+        if (left_ + x < 0 || top_ + y < 0 || left_ + x >= page.width || top_ + y >= page.height) continue;
+        const int32_t texel = TexelAt(left_ + x, top_ + y);
+        if (texel >= 0) ConnectCell(x, y, static_cast<uint32_t>(texel));
+      }
+    }
+  }
+
+  void ConnectCell(int x, int y, uint32_t texel) {
+    const bool mine = texel >= begin_ && texel < end_;
+    if (mine && !work_[texel - begin_].valid) return;
+    if (mine) work_[texel - begin_].open = ConnectTexel(scene_.world, map_, texel, counters_.filter_rays);
+    const PageSize page = map_.pages[map_.texels[texel].page];
+    for (int k = 0; k < 4; ++k) {
+      const int nx = left_ + x + kNeighbours[k][0], ny = top_ + y + kNeighbours[k][1];
+      if (nx < 0 || ny < 0 || nx >= page.width || ny >= page.height) continue;
+      const int32_t other = TexelAt(nx, ny);
+      if (other < 0 || map_.texels[other].chart != map_.texels[texel].chart) continue;
+      const bool other_mine = static_cast<uint32_t>(other) >= begin_ && static_cast<uint32_t>(other) < end_;
+      if (other_mine && !work_[static_cast<uint32_t>(other) - begin_].valid) continue;
+      if (!mine || (work_[texel - begin_].open >> k & 1)) grid_.Connect(x, y, k);
+    }
+  }
+
+  int32_t TexelAt(int x, int y) const {
+    const Texel& first = map_.texels[begin_];
+    const size_t width = static_cast<size_t>(map_.pages[first.page].width);
+    return map_.texel_at[first.page][static_cast<size_t>(y) * width + static_cast<size_t>(x)];
+  }
+
+  SmoothCell& CellOf(size_t i) {
+    const Texel& texel = map_.texels[begin_ + i];
+    return grid_.At(texel.x - left_, texel.y - top_);
+  }
+
+  // Variance of every texel's indirect light after filtering, as far as this tile can tell.
+  std::vector<float> SmoothedVariances() {
+    std::vector<float> result(work_.size());
+    for (size_t i = 0; i < work_.size(); ++i) {
+      if (!work_[i].valid) continue;
+      SmoothCell& cell = CellOf(i);
+      cell.known = true;
+      cell.value = Luminance(work_[i].indirect.Irradiance());
+      cell.variance = Luminance(work_[i].indirect.Variance());
+    }
+    ForEachCell([&](size_t i, int x, int y) { result[i] = grid_.PooledVariance(x, y); });
+    ForEachCell([&](size_t i, int, int) { CellOf(i).variance = result[i]; });
+    ForEachCell([&](size_t i, int x, int y) { CellOf(i).radius = static_cast<int8_t>(grid_.Choose(x, y)); });
+    ForEachCell([&](size_t i, int x, int y) { result[i] = grid_.SmoothedVariance(x, y, grid_.Agree(x, y)); });
+    return result;
+  }
+
+  template <typename Visit>
+  void ForEachCell(Visit visit) {
+    for (size_t i = 0; i < work_.size(); ++i) {
+      const Texel& texel = map_.texels[begin_ + i];
+      if (work_[i].valid) visit(i, texel.x - left_, texel.y - top_);
+    }
+  }
+
   // Switches off the estimators that meet their half of the target.
   void Decide() {
     if (options_.target_error <= 0) return;
     std::vector<std::array<bool, 2>> active(work_.size());
+    const std::vector<float> smoothed = options_.filter ? SmoothedVariances() : std::vector<float>{};
     for (size_t i = 0; i < work_.size(); ++i) {
       const Work& work = work_[i];
       const float irradiance = Luminance(work.direct.Irradiance() + work.indirect.Irradiance());
@@ -185,7 +257,7 @@ class TileGatherer {
       const float budget = 0.5f * scale * scale;
       active[i] = {work.direct_active &&
                        PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
-                   work.indirect_active &&
+                   work.indirect_active && (!options_.filter || smoothed[i] > budget) &&
                        PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.indirect; }) > budget};
     }
     for (size_t i = 0; i < work_.size(); ++i) {
@@ -212,13 +284,15 @@ class TileGatherer {
     light.irradiance = work.direct.Irradiance() + work.indirect.Irradiance();
     const RadianceSh direct = work.direct.Sh(), indirect = work.indirect.Sh();
     for (size_t i = 0; i < kShCoefficients; ++i) light.sh.lambda[i] = direct.lambda[i] + indirect.lambda[i];
-    light.variance = work.direct.Variance() + work.indirect.Variance();
+    light.indirect = {work.indirect.Irradiance(), indirect, work.indirect.Variance()};
+    light.variance = work.direct.Variance() + light.indirect.variance;
     // Photon noise is known in luminance; it is spread over the channels as the irradiance is.
     const float luminance = Luminance(light.irradiance);
     if (luminance > 0) {
       const Rgb share = light.irradiance / luminance;
       light.variance += share * share * PhotonVariance(work);
     }
+    light.open = work.open;
     light.direct_samples = work.direct_samples;
     light.indirect_samples = work.indirect_samples;
     return light;
@@ -230,6 +304,8 @@ class TileGatherer {
   const GatherOptions& options_;
   GatherCounters& counters_;
   std::optional<TileLights> lights_;
+  SmoothGrid grid_{kTileSide + 2 * SmoothGrid::kMostRadius, kTileSide + 2 * SmoothGrid::kMostRadius};
+  int left_ = 0, top_ = 0;  // of the grid, on the page
   std::vector<Work> work_;
 };
 

@@ -17,13 +17,23 @@ struct GatherOptions {
   float floor_share = 0.25f;
   float mean_irradiance = 0;  // luminance, of the whole bake, as the photons saw it [W m^-2]
   uint32_t seed = 0;
+  bool filter = true;  // the page will be filtered: the gather may stop where that brings its part to the target
+};
+
+// What one of a texel's two estimators found (light sampling, final gather).
+struct LightPart {
+  Rgb irradiance;
+  RadianceSh sh;
+  Rgb variance;  // of irradiance, by sampling alone
 };
 
 // One texel's result. Vectors in the world frame.
 struct TexelLight {
-  Rgb irradiance;  // at the geometric normal [W m^-2]
-  RadianceSh sh;   // incident radiance over the hemisphere around the geometric normal
-  Rgb variance;    // of irradiance, sampling and photons together
+  Rgb irradiance;      // at the geometric normal [W m^-2]
+  RadianceSh sh;       // incident radiance over the hemisphere around the geometric normal
+  Rgb variance;        // of irradiance, sampling and photons together
+  LightPart indirect;  // of the three above, what the final gather found
+  uint8_t open = 0;    // ConnectTexel: which neighbours the filter may look at
   float backface_share = 0;
   bool valid = true;  // false: inside other geometry; light is zero and no evidence for anybody
   int direct_samples = 0, indirect_samples = 0;

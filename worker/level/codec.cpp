@@ -60,8 +60,12 @@ void PutTexel(const TexelLight& light, FieldWriter& writer) {
   Put(light.irradiance, writer);
   Put(light.sh.lambda, writer);
   Put(light.variance, writer);
+  Put(light.indirect.irradiance, writer);
+  Put(light.indirect.sh.lambda, writer);
+  Put(light.indirect.variance, writer);
   Put(light.backface_share, writer);
   writer.Put(static_cast<uint8_t>(light.valid));
+  writer.Put(light.open);
   writer.Put(static_cast<uint32_t>(light.direct_samples));
   writer.Put(static_cast<uint32_t>(light.indirect_samples));
 }
@@ -71,14 +75,18 @@ TexelLight GetTexel(FieldReader& reader) {
   Get(reader, light.irradiance);
   Get(reader, light.sh.lambda);
   Get(reader, light.variance);
+  Get(reader, light.indirect.irradiance);
+  Get(reader, light.indirect.sh.lambda);
+  Get(reader, light.indirect.variance);
   Get(reader, light.backface_share);
   light.valid = reader.Get<uint8_t>() != 0;
+  light.open = reader.Get<uint8_t>();
   light.direct_samples = static_cast<int>(reader.Get<uint32_t>());
   light.indirect_samples = static_cast<int>(reader.Get<uint32_t>());
   return light;
 }
 
-constexpr size_t kTexelBytes = 4 * (3 + 27 + 3 + 1) + 1 + 8;
+constexpr size_t kTexelBytes = 4 * (2 * (3 + 27 + 3) + 1) + 2 + 8;
 constexpr size_t kCellBytes = 4 * 6 + 4 * kVarianceGroups + 1;
 
 }  // namespace
@@ -160,7 +168,7 @@ std::string SerializeTiles(const GatheredTiles& tiles) {
   FieldWriter writer;
   const GatherCounters& counters = tiles.counters;
   for (const int64_t value : {counters.gather_rays, counters.shadow_rays, counters.bounce_rays, counters.validity_rays,
-                              counters.bad_samples}) {
+                              counters.filter_rays, counters.bad_samples}) {
     Put(value, writer);
   }
   writer.Put(static_cast<uint64_t>(tiles.lights.size()));
@@ -173,7 +181,7 @@ absl::StatusOr<GatheredTiles> ParseTiles(std::string_view bytes) {
   GatheredTiles tiles;
   GatherCounters& counters = tiles.counters;
   for (int64_t* value : {&counters.gather_rays, &counters.shadow_rays, &counters.bounce_rays, &counters.validity_rays,
-                         &counters.bad_samples}) {
+                         &counters.filter_rays, &counters.bad_samples}) {
     Get(reader, *value);
   }
   const uint64_t count = reader.Get<uint64_t>();

@@ -7,6 +7,7 @@
 #include "core/atlas/serialize.h"
 #include "core/scene/canonical.h"
 #include "proto/settings.h"
+#include "worker/finish/filter.h"
 #include "worker/level/codec.h"
 #include "worker/level/page_files.h"
 #include "worker/trace/float_mode.h"
@@ -59,6 +60,7 @@ std::string LevelSettings(const BakeSettings& settings) {
   BakeSettings relevant = settings;
   relevant.target_error = 0;
   relevant.min_samples = relevant.max_samples = 0;
+  relevant.filter = true;
   return SettingsJson(relevant);
 }
 
@@ -188,7 +190,11 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
     std::copy(tiles.lights.begin(), tiles.lights.end(), lights.begin() + static_cast<ptrdiff_t>(next));
     next += tiles.lights.size();
   }
-  return PageFiles(level->texels, lights, static_cast<int>(work.range.begin));
+  const int page = static_cast<int>(work.range.begin);
+  FilterCounters filtered;
+  if (page >= static_cast<int>(level->texels.pages.size())) return absl::InvalidArgumentError("no such page");
+  if (work.settings.filter) FilterPage(level->texels, page, lights, filtered);
+  return PageFiles(level->texels, lights, page);
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Report(const Work& work) {
@@ -200,6 +206,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Report(const Work& work) {
     sum.shadow_rays += tiles.counters.shadow_rays;
     sum.bounce_rays += tiles.counters.bounce_rays;
     sum.validity_rays += tiles.counters.validity_rays;
+    sum.filter_rays += tiles.counters.filter_rays;
     sum.bad_samples += tiles.counters.bad_samples;
     texels += std::ssize(tiles.lights);
     for (const TexelLight& light : tiles.lights) invalid += light.valid ? 0 : 1;
@@ -216,6 +223,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Report(const Work& work) {
                                .Add("gather/shadow_rays", sum.shadow_rays)
                                .Add("gather/bounce_rays", sum.bounce_rays)
                                .Add("gather/bad_samples", sum.bad_samples)
+                               .Add("filter/rays", sum.filter_rays)
                                .Add("texels/validity_rays", sum.validity_rays)
                                .Text();
   return MadeOutputs{{"statistics.json", json + "\n"}};

@@ -44,6 +44,7 @@ Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
   budget.gather.min_samples = std::min(budget.gather.min_samples, budget.gather.max_samples);
   budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
   budget.gather.seed = settings.seed;
+  budget.gather.filter = settings.filter;
   const int64_t texel_count = static_cast<int64_t>(texels.texels.size());
   budget.photons =
       settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texel_count * numbers.photons_per_texel);

@@ -17,8 +17,8 @@ struct EmissiveTriangle {
 
 // Light that arrives at a point from one sampled point of one light, before visibility.
 struct LightSample {
-  Vec3f dir;              // unit, towards the light
-  Vec3f target;           // where the shadow ray ends (finite lights)
+  Vec3f dir;     // unit, towards the light
+  Vec3f target;  // where the shadow ray ends (finite lights)
   uint32_t target_triangle = kNoTriangle;
   bool infinite = false;  // the shadow ray has no end
   Rgb perpendicular;      // irradiance on a plane facing the light, divided by the pdf of the point [W m^-2]

@@ -70,8 +70,8 @@ Vec2f OnSquare(const World& world, const Frame& frame, Vec3f p) {
   return {Dot(d, frame.t) / world.radius(), Dot(d, frame.b) / world.radius()};
 }
 
-// The axes that the sky's photons are drawn in follow the geometry as far as the sky's symmetry allows, so that a turned
-// level meets the same photons.
+// The axes that the sky's photons are drawn in follow the geometry as far as the sky's symmetry allows, so that a
+// turned level meets the same photons.
 Frame SkyAxes(const World& world, EnvironmentType type) {
   const Frame fixed = FrameFromHint({0, 1, 0}, {1, 0, 0});
   if (type == EnvironmentType::kLatLong || world.triangles().empty()) return fixed;

@@ -25,9 +25,9 @@ inline constexpr uint32_t kNoTriangle = ~0u;
 
 struct Ray {
   Vec3f origin;
-  Vec3f dir;                                    // unit
-  float t_max;                                  // [m], infinity allowed
-  uint32_t key = 0;                             // decides what a BLEND surface lets through
+  Vec3f dir;                                      // unit
+  float t_max;                                    // [m], infinity allowed
+  uint32_t key = 0;                               // decides what a BLEND surface lets through
   uint32_t from = kNoTriangle, to = kNoTriangle;  // the triangles that it starts and ends on, if any: never hit
 };
 

@@ -1,0 +1,230 @@
+#include "worker/filter/window.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bakewell {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr float kLift = 0.05f;        // height of the rays between neighbours, over their length
+constexpr float kSameFacing = 0.9f;   // least cosine between the normals of neighbours
+constexpr double kConfidence = 0.85;  // half width of a confidence interval, in standard errors
+constexpr double kRidge = 1e-3;       // holds slopes back, so that texels in one line or one corner give an answer too
+
+// Sums over a window's texels for a first-order regression over their offsets x, y [texels].
+struct Moments {
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  void Add(double dx, double dy) {
+    n += 1;
+    x += dx;
+    y += dy;
+    xx += dx * dx;
+    xy += dx * dy;
+    yy += dy * dy;
+  }
+};
+
+// The regression's value at the window's centre is the sum of the values with weights constant + x dx + y dy.
+struct Weights {
+  double constant, x, y;
+
+  // First row of the inverse of the normal equations.
+  explicit Weights(const Moments& m) {
+    const double xx = m.xx + kRidge * m.n, yy = m.yy + kRidge * m.n;
+    const double c0 = xx * yy - m.xy * m.xy, c1 = m.xy * m.y - m.x * yy, c2 = m.x * m.xy - xx * m.y;
+    const double det = m.n * c0 + m.x * c1 + m.y * c2;
+    constant = c0 / det;
+    x = c1 / det;
+    y = c2 / det;
+  }
+  double At(int dx, int dy) const { return constant + x * dx + y * dy; }
+  // Sum of the squared weights.
+  double Square(const Moments& m) const {
+    return constant * constant * m.n + x * x * m.xx + y * y * m.yy +
+           2 * (constant * x * m.x + constant * y * m.y + x * y * m.xy);
+  }
+};
+
+}  // namespace
+
+uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, int64_t& rays) {
+  const Texel& a = map.texels[texel];
+  const PageSize page = map.pages[a.page];
+  uint8_t open = 0;
+  for (size_t k = 0; k < 4; ++k) {
+    const int x = a.x + kNeighbours[k][0], y = a.y + kNeighbours[k][1];
+    if (x < 0 || y < 0 || x >= page.width || y >= page.height) continue;
+    const int32_t other =
+        map.texel_at[a.page][static_cast<size_t>(y) * static_cast<size_t>(page.width) + static_cast<size_t>(x)];
+    if (other < 0) continue;
+    const Texel& b = map.texels[other];
+    if (a.chart != b.chart || Dot(a.normal, b.normal) < kSameFacing) continue;
+    const float lift = kLift * Length(b.position - a.position);
+    const Vec3f from = a.position + a.normal * lift, way = b.position + b.normal * lift - from;
+    const float length = Length(way);
+    if (length > 0) {
+      ++rays;
+      if (world.Occluded({from, way / length, length, 0})) continue;
+    }
+    open |= static_cast<uint8_t>(1U << k);
+  }
+  return open;
+}
+
+void SmoothGrid::Connect(int x, int y, int k) {
+  const int nx = x + kNeighbours[k][0], ny = y + kNeighbours[k][1];
+  if (!Contains(nx, ny)) return;
+  At(x, y).open |= static_cast<uint8_t>(1U << k);
+  At(nx, ny).open |= static_cast<uint8_t>(1U << ((k + 4) % 8));
+}
+
+float SmoothGrid::PooledVariance(int x, int y) const {
+  const SmoothCell& cell = At(x, y);
+  float sum = cell.variance;
+  int count = 1;
+  for (size_t k = 0; k < kNeighbours.size(); ++k) {
+    if (!(cell.open >> k & 1)) continue;
+    const SmoothCell& other = At(x + kNeighbours[k][0], y + kNeighbours[k][1]);
+    if (!other.known) continue;
+    sum += other.variance;
+    ++count;
+  }
+  return sum / static_cast<float>(count);
+}
+
+// A window that grows ring by ring.
+class SmoothGrid::Growth {
+ public:
+  Growth(const SmoothGrid& grid, int x, int y) : grid_(grid), x_(x), y_(y) { Add(0, 0); }
+
+  int radius() const { return radius_; }
+  const Moments& known() const { return known_; }  // texels with a value
+  const Moments& all() const { return all_; }
+  double mean_variance() const { return variance_ / known_.n; }
+  bool Has(int dx, int dy) const { return inside_[Window::Index(dx, dy)]; }
+
+  // The regression's value at the centre.
+  double Estimate(const Weights& w) const { return w.constant * value_ + w.x * value_x_ + w.y * value_y_; }
+  double Variance(const Weights& w) const { return w.Square(known_) * mean_variance(); }
+
+  // Adds the next ring's texels that are connected to the window. False where there are none.
+  bool Grow() {
+    const int r = ++radius_;
+    bool grown = false;
+    // There and back again, so that texels of the ring that are reached along it join too.
+    for (const bool forth : {true, false}) {
+      for (int step = 0; step < 8 * r; ++step) {
+        const int s = forth ? step : 8 * r - 1 - step, along = s % (2 * r) - r;
+        switch (s / (2 * r)) {
+          case 0:
+            grown |= TryJoin(along, -r);
+            break;
+          case 1:
+            grown |= TryJoin(r, along);
+            break;
+          case 2:
+            grown |= TryJoin(-along, r);
+            break;
+          default:
+            grown |= TryJoin(-r, -along);
+        }
+      }
+    }
+    return grown;
+  }
+
+ private:
+  bool TryJoin(int dx, int dy) {
+    const int x = x_ + dx, y = y_ + dy;
+    if (!grid_.Contains(x, y) || inside_[Window::Index(dx, dy)]) return false;
+    const uint8_t open = grid_.At(x, y).open;
+    if (open == 0) return false;
+    for (size_t k = 0; k < kNeighbours.size(); ++k) {
+      const int ix = dx + kNeighbours[k][0], iy = dy + kNeighbours[k][1];
+      if (!(open >> k & 1) || std::max(std::abs(ix), std::abs(iy)) > radius_ || !inside_[Window::Index(ix, iy)])
+        continue;
+      Add(dx, dy);
+      return true;
+    }
+    return false;
+  }
+
+  void Add(int dx, int dy) {
+    inside_[Window::Index(dx, dy)] = true;
+    all_.Add(dx, dy);
+    const SmoothCell& cell = grid_.At(x_ + dx, y_ + dy);
+    if (!cell.known) return;
+    known_.Add(dx, dy);
+    const double value = static_cast<double>(cell.value);
+    value_ += value;
+    value_x_ += value * dx;
+    value_y_ += value * dy;
+    variance_ += static_cast<double>(cell.variance);
+  }
+
+  const SmoothGrid& grid_;
+  const int x_, y_;
+  int radius_ = 0;
+  Moments known_, all_;
+  double value_ = 0, value_x_ = 0, value_y_ = 0, variance_ = 0;
+  std::array<bool, (2 * kMostRadius + 1) * (2 * kMostRadius + 1)> inside_{};
+};
+
+int SmoothGrid::Choose(int x, int y) const {
+  if (!(At(x, y).variance > 0)) return 0;
+  Growth window(*this, x, y);
+  double low = -kInfinity, high = kInfinity;
+  for (;;) {
+    const Weights weights(window.known());
+    const double estimate = window.Estimate(weights), reach = kConfidence * std::sqrt(window.Variance(weights));
+    low = std::max(low, estimate - reach);
+    high = std::min(high, estimate + reach);
+    if (low > high) return window.radius() - 1;
+    if (window.radius() == kMostRadius) return kMostRadius;
+    if (!window.Grow()) return window.radius() - 1;
+  }
+}
+
+int SmoothGrid::Agree(int x, int y) const {
+  const SmoothCell& cell = At(x, y);
+  std::array<int, kMostRadius + 1> votes{};
+  int count = 1;
+  votes[static_cast<size_t>(cell.radius)] += 1;
+  for (size_t k = 0; k < kNeighbours.size(); ++k) {
+    if (!(cell.open >> k & 1)) continue;
+    const SmoothCell& other = At(x + kNeighbours[k][0], y + kNeighbours[k][1]);
+    if (!other.known) continue;
+    votes[static_cast<size_t>(other.radius)] += 1;
+    ++count;
+  }
+  int median = 0;
+  for (int below = votes[0]; 2 * below < count; below += votes[median]) ++median;
+  return median;
+}
+
+SmoothGrid::Window SmoothGrid::WindowOf(int x, int y, int radius) const {
+  Growth growth(*this, x, y);
+  while (growth.radius() < radius && growth.Grow()) {
+  }
+  const Weights weights(growth.known());
+  Window window;
+  window.radius = growth.radius();
+  for (int dy = -window.radius; dy <= window.radius; ++dy) {
+    for (int dx = -window.radius; dx <= window.radius; ++dx) {
+      if (!growth.Has(dx, dy) || !At(x + dx, y + dy).known) continue;
+      window.weight[Window::Index(dx, dy)] = static_cast<float>(weights.At(dx, dy));
+    }
+  }
+  return window;
+}
+
+float SmoothGrid::SmoothedVariance(int x, int y, int radius) const {
+  Growth growth(*this, x, y);
+  while (growth.radius() < radius && growth.Grow()) {
+  }
+  return static_cast<float>(Weights(growth.all()).Square(growth.all()) * growth.mean_variance());
+}
+
+}  // namespace bakewell

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "worker/texel/texels.h"
+
+namespace bakewell {
+
+// The eight neighbours of a texel. Direction k + 4 is the opposite of k.
+inline constexpr std::array<std::array<int, 2>, 8> kNeighbours = {
+    {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
+
+// Which of its first four neighbours a texel is connected to, bit k for direction k: those of its chart that face about
+// the same way and that a short ray just above the surface reaches.
+uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, int64_t& rays);
+
+// One texel of a noisy signal.
+struct SmoothCell {
+  float value = 0;
+  float variance = 0;  // of value
+  uint8_t open = 0;    // bit k: connected to neighbour k; mutual
+  bool known = false;  // value and variance are there
+  int8_t radius = 0;   // of the window that it would choose by itself
+};
+
+// A rectangle of texels with a noisy signal, and how far around each texel it may be averaged.
+//
+// A texel's estimate is a first-order regression over the square window around it, as far as connected texels reach.
+// The window grows as long as the confidence intervals of all its estimates so far intersect (Goldenshluger &
+// Nemirovski 1997; Katkovnik 1999): where the signal bends more than the noise hides, or where there is no noise, the
+// window stays at the texel itself.
+class SmoothGrid {
+ public:
+  static constexpr int kMostRadius = 7;
+
+  SmoothGrid(int width, int height)
+      : width_(width), height_(height), cells_(static_cast<size_t>(width) * static_cast<size_t>(height)) {}
+
+  SmoothCell& At(int x, int y) { return cells_[Place(x, y)]; }
+  const SmoothCell& At(int x, int y) const { return cells_[Place(x, y)]; }
+  bool Contains(int x, int y) const { return x >= 0 && y >= 0 && x < width_ && y < height_; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  // Connects (x, y) with its neighbour in direction k, if that lies on the grid.
+  void Connect(int x, int y, int k);
+
+  // Mean variance of a known texel and its connected neighbours: eight blocks alone say little.
+  float PooledVariance(int x, int y) const;
+
+  // The largest window whose estimate agrees with those of all smaller ones.
+  int Choose(int x, int y) const;
+
+  // The median of the radii of a texel and its neighbours (SmoothCell::radius): a texel that strays by more than its
+  // interval, as some must, would otherwise keep to itself.
+  int Agree(int x, int y) const;
+
+  // The estimate at the centre of a window is the sum of its values with these weights.
+  struct Window {
+    int radius = 0;
+    std::array<float, (2 * kMostRadius + 1) * (2 * kMostRadius + 1)> weight{};  // rows of 2 kMostRadius + 1
+    float At(int dx, int dy) const { return weight[Index(dx, dy)]; }
+    static size_t Index(int dx, int dy) {
+      return static_cast<size_t>((dy + kMostRadius) * (2 * kMostRadius + 1) + dx + kMostRadius);
+    }
+  };
+  // Over known texels. radius is 0 where nothing is connected.
+  Window WindowOf(int x, int y, int radius) const;
+
+  // Variance that the estimate of a window of this radius has, texels beyond what is known counted as if they were.
+  float SmoothedVariance(int x, int y, int radius) const;
+
+ private:
+  size_t Place(int x, int y) const {
+    return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
+  }
+  class Growth;
+
+  int width_, height_;
+  std::vector<SmoothCell> cells_;
+};
+
+}  // namespace bakewell

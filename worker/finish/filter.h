@@ -1,0 +1,18 @@
+#pragma once
+
+#include <span>
+
+#include "worker/gather/tile.h"
+
+namespace bakewell {
+
+struct FilterCounters {
+  int64_t filtered = 0;  // texels whose window is more than themselves
+};
+
+// Smooths the indirect light of one page's texels (worker/filter/window.h), never with invalid ones; elements as in
+// TexelMap::texels, of which those of other pages are left alone. Irradiance and all SH coefficients get the same
+// weights, and every chart keeps its sum, so that what is smoothed away is not lost.
+void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, FilterCounters& counters);
+
+}  // namespace bakewell
