@@ -65,7 +65,7 @@ void AddSharedFlags(CLI::App& command, BakeFlags& flags) {
                      "none, constant:R,G,B, gradient:R,G,B/R,G,B/R,G,B (zenith/horizon/ground) or FILE.exr "
                      "(latitude-longitude), instead of the scene's");
   command.add_option("--albedo-limit", flags.albedo_limit, "Largest albedo; above it is clamped (0.98)");
-  command.add_flag("--filter,!--no-filter", flags.filter, "Smooth indirect light as far as its noise hides (on)");
+  command.add_flag("--no-filter", flags.no_filter, "Leave the noise of indirect light as it is");
   command.add_option("--footprint", flags.footprint, "Side of the square that a texel averages, in texels (0.5)");
   command.add_option("--seed", flags.seed, "Another seed, other noise");
   command.add_option("--threads", flags.threads, "Threads; 0: as many as the machine has")->capture_default_str();
@@ -97,7 +97,7 @@ absl::StatusOr<BakeSettings> SettingsFromFlags(const BakeFlags& flags) {
   settings.photon_batches = flags.photon_batches.value_or(settings.photon_batches);
   settings.albedo_limit = flags.albedo_limit.value_or(settings.albedo_limit);
   settings.footprint = flags.footprint.value_or(settings.footprint);
-  settings.filter = flags.filter.value_or(settings.filter);
+  settings.filter = settings.filter && !flags.no_filter;
   settings.seed = flags.seed.value_or(settings.seed);
   if (flags.environment) {
     BAKEWELL_ASSIGN_OR_RETURN(settings.environment, ParseEnvironment(*flags.environment));

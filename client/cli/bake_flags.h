@@ -21,7 +21,7 @@ struct BakeFlags {
 
   std::optional<std::string> uv, quality, backfaces, environment;
   std::optional<int> resolution, max_samples, photon_batches;
-  std::optional<bool> filter;
+  bool no_filter = false;
   std::optional<float> texels_per_metre, target_error, albedo_limit, footprint;
   std::optional<int64_t> photons;
   std::optional<uint32_t> seed;

@@ -220,11 +220,13 @@ SmoothGrid::Window SmoothGrid::WindowOf(int x, int y, int radius) const {
   return window;
 }
 
-float SmoothGrid::SmoothedVariance(int x, int y, int radius) const {
+SmoothGrid::Smoothed SmoothGrid::SmoothedAt(int x, int y, int radius) const {
   Growth growth(*this, x, y);
   while (growth.radius() < radius && growth.Grow()) {
   }
-  return static_cast<float>(Weights(growth.all()).Square(growth.all()) * growth.mean_variance());
+  const double square = Weights(growth.all()).Square(growth.all());
+  return {static_cast<float>(growth.Estimate(Weights(growth.known()))),
+          static_cast<float>(square * growth.mean_variance())};
 }
 
 }  // namespace bakewell

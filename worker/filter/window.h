@@ -69,8 +69,12 @@ class SmoothGrid {
   // Over known texels. radius is 0 where nothing is connected.
   Window WindowOf(int x, int y, int radius) const;
 
-  // Variance that the estimate of a window of this radius has, texels beyond what is known counted as if they were.
-  float SmoothedVariance(int x, int y, int radius) const;
+  // The estimate of a window of this radius, and the variance that it will have once texels that are not known yet are as
+  // well known as the others.
+  struct Smoothed {
+    float value = 0, variance = 0;
+  };
+  Smoothed SmoothedAt(int x, int y, int radius) const;
 
  private:
   size_t Place(int x, int y) const {

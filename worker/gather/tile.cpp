@@ -218,9 +218,9 @@ class TileGatherer {
     return grid_.At(texel.x - left_, texel.y - top_);
   }
 
-  // Variance of every texel's indirect light after filtering, as far as this tile can tell.
-  std::vector<float> SmoothedVariances() {
-    std::vector<float> result(work_.size());
+  // Every texel's indirect luminance and its variance after filtering, as far as this tile can tell.
+  std::vector<SmoothGrid::Smoothed> SmoothIndirect() {
+    std::vector<SmoothGrid::Smoothed> result(work_.size());
     for (size_t i = 0; i < work_.size(); ++i) {
       if (!work_[i].valid) continue;
       SmoothCell& cell = CellOf(i);
@@ -228,10 +228,10 @@ class TileGatherer {
       cell.value = Luminance(work_[i].indirect.Irradiance());
       cell.variance = Luminance(work_[i].indirect.Variance());
     }
-    ForEachCell([&](size_t i, int x, int y) { result[i] = grid_.PooledVariance(x, y); });
-    ForEachCell([&](size_t i, int, int) { CellOf(i).variance = result[i]; });
+    ForEachCell([&](size_t i, int x, int y) { result[i].variance = grid_.PooledVariance(x, y); });
+    ForEachCell([&](size_t i, int, int) { CellOf(i).variance = result[i].variance; });
     ForEachCell([&](size_t i, int x, int y) { CellOf(i).radius = static_cast<int8_t>(grid_.Choose(x, y)); });
-    ForEachCell([&](size_t i, int x, int y) { result[i] = grid_.SmoothedVariance(x, y, grid_.Agree(x, y)); });
+    ForEachCell([&](size_t i, int x, int y) { result[i] = grid_.SmoothedAt(x, y, grid_.Agree(x, y)); });
     return result;
   }
 
@@ -247,17 +247,21 @@ class TileGatherer {
   void Decide() {
     if (options_.target_error <= 0) return;
     std::vector<std::array<bool, 2>> active(work_.size());
-    const std::vector<float> smoothed = options_.filter ? SmoothedVariances() : std::vector<float>{};
+    std::vector<SmoothGrid::Smoothed> smooth;
+    if (options_.filter) smooth = SmoothIndirect();
     for (size_t i = 0; i < work_.size(); ++i) {
       const Work& work = work_[i];
-      const float irradiance = Luminance(work.direct.Irradiance() + work.indirect.Irradiance());
+      if (!work.valid) continue;
+      // A stray sample must not raise its own tolerance: the smoothed light judges where there is one.
+      const float indirect = options_.filter ? smooth[i].value : Luminance(work.indirect.Irradiance());
+      const float irradiance = Luminance(work.direct.Irradiance()) + indirect;
       // Between equal absolute and equal relative errors: what matters to the root mean square and to the eye.
       const float mean = options_.mean_irradiance;
       const float scale = options_.target_error * std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
       const float budget = 0.5f * scale * scale;
       active[i] = {work.direct_active &&
                        PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
-                   work.indirect_active && (!options_.filter || smoothed[i] > budget) &&
+                   work.indirect_active && (!options_.filter || smooth[i].variance > budget) &&
                        PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.indirect; }) > budget};
     }
     for (size_t i = 0; i < work_.size(); ++i) {
