@@ -109,30 +109,36 @@ class SmoothGrid::Growth {
   double Estimate(const Weights& w) const { return w.constant * value_ + w.x * value_x_ + w.y * value_y_; }
   double Variance(const Weights& w) const { return w.Square(known_) * mean_variance(); }
 
+  Smoothed Result(const Weights& weights, double estimate) const {
+    const double square = known_.n == all_.n ? weights.Square(known_) : Weights(all_).Square(all_);
+    return {static_cast<float>(estimate), static_cast<float>(square * mean_variance())};
+  }
+
   // Adds the next ring's texels that are connected to the window. False where there are none.
   bool Grow() {
     const int r = ++radius_;
-    bool grown = false;
+    int joined = 0;
     // There and back again, so that texels of the ring that are reached along it join too.
     for (const bool forth : {true, false}) {
+      if (joined == 8 * r) break;
       for (int step = 0; step < 8 * r; ++step) {
         const int s = forth ? step : 8 * r - 1 - step, along = s % (2 * r) - r;
         switch (s / (2 * r)) {
           case 0:
-            grown |= TryJoin(along, -r);
+            joined += TryJoin(along, -r) ? 1 : 0;
             break;
           case 1:
-            grown |= TryJoin(r, along);
+            joined += TryJoin(r, along) ? 1 : 0;
             break;
           case 2:
-            grown |= TryJoin(-along, r);
+            joined += TryJoin(-along, r) ? 1 : 0;
             break;
           default:
-            grown |= TryJoin(-r, -along);
+            joined += TryJoin(-r, -along) ? 1 : 0;
         }
       }
     }
-    return grown;
+    return joined > 0;
   }
 
  private:
@@ -141,14 +147,22 @@ class SmoothGrid::Growth {
     if (!grid_.Contains(x, y) || inside_[Window::Index(dx, dy)]) return false;
     const uint8_t open = grid_.At(x, y).open;
     if (open == 0) return false;
-    for (size_t k = 0; k < kNeighbours.size(); ++k) {
+    // Towards the centre first: on a plain surface that is all there is to ask.
+    const size_t inward = Direction((dx < 0) - (dx > 0), (dy < 0) - (dy > 0));
+    for (size_t turn = 0; turn < kNeighbours.size(); ++turn) {
+      const size_t k = (inward + turn) % kNeighbours.size();
+      if (!(open >> k & 1)) continue;
       const int ix = dx + kNeighbours[k][0], iy = dy + kNeighbours[k][1];
-      if (!(open >> k & 1) || std::max(std::abs(ix), std::abs(iy)) > radius_ || !inside_[Window::Index(ix, iy)])
-        continue;
+      if (std::max(std::abs(ix), std::abs(iy)) > radius_ || !inside_[Window::Index(ix, iy)]) continue;
       Add(dx, dy);
       return true;
     }
     return false;
+  }
+
+  static size_t Direction(int dx, int dy) {
+    constexpr std::array<uint8_t, 9> kDirection = {5, 6, 7, 4, 0, 0, 3, 2, 1};
+    return kDirection[static_cast<size_t>(3 * (dy + 1) + dx + 1)];
   }
 
   void Add(int dx, int dy) {
@@ -172,18 +186,17 @@ class SmoothGrid::Growth {
   std::array<bool, (2 * kMostRadius + 1) * (2 * kMostRadius + 1)> inside_{};
 };
 
-int SmoothGrid::Choose(int x, int y) const {
-  if (!(At(x, y).variance > 0)) return 0;
+int SmoothGrid::Choose(int x, int y, Steps* steps) const {
   Growth window(*this, x, y);
   double low = -kInfinity, high = kInfinity;
-  for (;;) {
+  for (int radius = 0;; ++radius) {
     const Weights weights(window.known());
     const double estimate = window.Estimate(weights), reach = kConfidence * std::sqrt(window.Variance(weights));
+    if (steps != nullptr) (*steps)[static_cast<size_t>(radius)] = window.Result(weights, estimate);
     low = std::max(low, estimate - reach);
     high = std::min(high, estimate + reach);
-    if (low > high) return window.radius() - 1;
-    if (window.radius() == kMostRadius) return kMostRadius;
-    if (!window.Grow()) return window.radius() - 1;
+    if (low > high) return radius - 1;
+    if (radius == kMostRadius || !(window.mean_variance() > 0) || !window.Grow()) return radius;
   }
 }
 
@@ -224,9 +237,8 @@ SmoothGrid::Smoothed SmoothGrid::SmoothedAt(int x, int y, int radius) const {
   Growth growth(*this, x, y);
   while (growth.radius() < radius && growth.Grow()) {
   }
-  const double square = Weights(growth.all()).Square(growth.all());
-  return {static_cast<float>(growth.Estimate(Weights(growth.known()))),
-          static_cast<float>(square * growth.mean_variance())};
+  const Weights weights(growth.known());
+  return growth.Result(weights, growth.Estimate(weights));
 }
 
 }  // namespace bakewell

@@ -50,8 +50,16 @@ class SmoothGrid {
   // Mean variance of a known texel and its connected neighbours: eight blocks alone say little.
   float PooledVariance(int x, int y) const;
 
-  // The largest window whose estimate agrees with those of all smaller ones.
-  int Choose(int x, int y) const;
+  // The estimate of a window, and the variance that it will have once texels that are not known yet are as well known as
+  // the others.
+  struct Smoothed {
+    float value = 0, variance = -1;  // negative: not computed
+  };
+  using Steps = std::array<Smoothed, kMostRadius + 1>;
+  // The radius of the largest window whose estimate agrees with those of all smaller ones; on the way there, the
+  // estimates by radius.
+  int Choose(int x, int y, Steps* steps = nullptr) const;
+  Smoothed SmoothedAt(int x, int y, int radius) const;
 
   // The median of the radii of a texel and its neighbours (SmoothCell::radius): a texel that strays by more than its
   // interval, as some must, would otherwise keep to itself.
@@ -68,13 +76,6 @@ class SmoothGrid {
   };
   // Over known texels. radius is 0 where nothing is connected.
   Window WindowOf(int x, int y, int radius) const;
-
-  // The estimate of a window of this radius, and the variance that it will have once texels that are not known yet are as
-  // well known as the others.
-  struct Smoothed {
-    float value = 0, variance = 0;
-  };
-  Smoothed SmoothedAt(int x, int y, int radius) const;
 
  private:
   size_t Place(int x, int y) const {
