@@ -186,59 +186,76 @@ class SmoothGrid::Growth {
   std::array<bool, (2 * kMostRadius + 1) * (2 * kMostRadius + 1)> inside_{};
 };
 
-int SmoothGrid::Choose(int x, int y, Steps* steps) const {
+float SmoothGrid::Choose(int x, int y, Steps* steps) const {
   Growth window(*this, x, y);
-  double low = -kInfinity, high = kInfinity;
+  double low = -kInfinity, high = kInfinity, overlap = 0;
   for (int radius = 0;; ++radius) {
     const Weights weights(window.known());
     const double estimate = window.Estimate(weights), reach = kConfidence * std::sqrt(window.Variance(weights));
     if (steps != nullptr) (*steps)[static_cast<size_t>(radius)] = window.Result(weights, estimate);
     low = std::max(low, estimate - reach);
     high = std::min(high, estimate + reach);
-    if (low > high) return radius - 1;
-    if (radius == kMostRadius || !(window.mean_variance() > 0) || !window.Grow()) return radius;
+    const double before = overlap;
+    overlap = high - low;
+    if (overlap < 0) return static_cast<float>(radius - 1 + before / (before - overlap));
+    if (radius == kMostRadius || !(window.mean_variance() > 0) || !window.Grow()) return static_cast<float>(radius);
   }
 }
 
-int SmoothGrid::Agree(int x, int y) const {
+float SmoothGrid::Agree(int x, int y) const {
   const SmoothCell& cell = At(x, y);
-  std::array<int, kMostRadius + 1> votes{};
-  int count = 1;
-  votes[static_cast<size_t>(cell.radius)] += 1;
+  std::array<float, 9> radii{cell.radius};
+  size_t count = 1;
   for (size_t k = 0; k < kNeighbours.size(); ++k) {
     if (!(cell.open >> k & 1)) continue;
     const SmoothCell& other = At(x + kNeighbours[k][0], y + kNeighbours[k][1]);
     if (!other.known) continue;
-    votes[static_cast<size_t>(other.radius)] += 1;
-    ++count;
+    size_t place = count++;
+    for (; place > 0 && radii[place - 1] > other.radius; --place) radii[place] = radii[place - 1];
+    radii[place] = other.radius;
   }
-  int median = 0;
-  for (int below = votes[0]; 2 * below < count; below += votes[median]) ++median;
-  return median;
+  return radii[(count - 1) / 2];
 }
 
-SmoothGrid::Window SmoothGrid::WindowOf(int x, int y, int radius) const {
+SmoothGrid::Window SmoothGrid::WindowOf(int x, int y, float radius) const {
+  const int whole = static_cast<int>(radius);
+  const float part = radius - static_cast<float>(whole);
   Growth growth(*this, x, y);
-  while (growth.radius() < radius && growth.Grow()) {
+  while (growth.radius() < whole && growth.Grow()) {
   }
-  const Weights weights(growth.known());
   Window window;
-  window.radius = growth.radius();
-  for (int dy = -window.radius; dy <= window.radius; ++dy) {
-    for (int dx = -window.radius; dx <= window.radius; ++dx) {
-      if (!growth.Has(dx, dy) || !At(x + dx, y + dy).known) continue;
-      window.weight[Window::Index(dx, dy)] = static_cast<float>(weights.At(dx, dy));
-    }
+  AddWeights(growth, x, y, 1 - part, window);
+  if (part > 0) {
+    growth.Grow();
+    AddWeights(growth, x, y, part, window);
   }
   return window;
 }
 
-SmoothGrid::Smoothed SmoothGrid::SmoothedAt(int x, int y, int radius) const {
-  Growth growth(*this, x, y);
-  while (growth.radius() < radius && growth.Grow()) {
-  }
+void SmoothGrid::AddWeights(const Growth& growth, int x, int y, float share, Window& window) const {
   const Weights weights(growth.known());
-  return growth.Result(weights, growth.Estimate(weights));
+  window.radius = growth.radius();
+  for (int dy = -window.radius; dy <= window.radius; ++dy) {
+    for (int dx = -window.radius; dx <= window.radius; ++dx) {
+      if (!growth.Has(dx, dy) || !At(x + dx, y + dy).known) continue;
+      window.weight[Window::Index(dx, dy)] += share * static_cast<float>(weights.At(dx, dy));
+    }
+  }
+}
+
+SmoothGrid::Smoothed SmoothGrid::SmoothedAt(int x, int y, float radius, Steps& steps) const {
+  const size_t whole = static_cast<size_t>(radius), next = std::min<size_t>(whole + 1, kMostRadius);
+  if (steps[whole].variance < 0 || steps[next].variance < 0) {
+    Growth growth(*this, x, y);
+    for (size_t r = 0; r <= next; ++r) {
+      const Weights weights(growth.known());
+      steps[r] = growth.Result(weights, growth.Estimate(weights));
+      if (r < next) growth.Grow();
+    }
+  }
+  const float part = radius - static_cast<float>(whole);
+  return {steps[whole].value * (1 - part) + steps[next].value * part,
+          steps[whole].variance * (1 - part) + steps[next].variance * part};
 }
 
 }  // namespace bakewell

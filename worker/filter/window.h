@@ -22,7 +22,7 @@ struct SmoothCell {
   float variance = 0;  // of value
   uint8_t open = 0;    // bit k: connected to neighbour k; mutual
   bool known = false;  // value and variance are there
-  int8_t radius = 0;   // of the window that it would choose by itself
+  float radius = 0;    // of the window that it would choose by itself
 };
 
 // A rectangle of texels with a noisy signal, and how far around each texel it may be averaged.
@@ -50,20 +50,22 @@ class SmoothGrid {
   // Mean variance of a known texel and its connected neighbours: eight blocks alone say little.
   float PooledVariance(int x, int y) const;
 
-  // The estimate of a window, and the variance that it will have once texels that are not known yet are as well known as
-  // the others.
+  // The estimate of a window, and the variance that it will have once texels that are not known yet are as well known
+  // as the others.
   struct Smoothed {
     float value = 0, variance = -1;  // negative: not computed
   };
   using Steps = std::array<Smoothed, kMostRadius + 1>;
-  // The radius of the largest window whose estimate agrees with those of all smaller ones; on the way there, the
-  // estimates by radius.
-  int Choose(int x, int y, Steps* steps = nullptr) const;
-  Smoothed SmoothedAt(int x, int y, int radius) const;
+  // The radius of the largest window whose estimate agrees with those of all smaller ones, between two whole ones where
+  // the intervals part: it is continuous in the values. On the way there, the estimates by radius.
+  float Choose(int x, int y, Steps* steps = nullptr) const;
 
   // The median of the radii of a texel and its neighbours (SmoothCell::radius): a texel that strays by more than its
   // interval, as some must, would otherwise keep to itself.
-  int Agree(int x, int y) const;
+  float Agree(int x, int y) const;
+
+  // What a window of `radius` gives; fills in the steps that it needs.
+  Smoothed SmoothedAt(int x, int y, float radius, Steps& steps) const;
 
   // The estimate at the centre of a window is the sum of its values with these weights.
   struct Window {
@@ -74,14 +76,15 @@ class SmoothGrid {
       return static_cast<size_t>((dy + kMostRadius) * (2 * kMostRadius + 1) + dx + kMostRadius);
     }
   };
-  // Over known texels. radius is 0 where nothing is connected.
-  Window WindowOf(int x, int y, int radius) const;
+  // Over known texels; between whole radii, the mix of the two windows.
+  Window WindowOf(int x, int y, float radius) const;
 
  private:
   size_t Place(int x, int y) const {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
   class Growth;
+  void AddWeights(const Growth& growth, int x, int y, float share, Window& window) const;
 
   int width_, height_;
   std::vector<SmoothCell> cells_;

@@ -26,7 +26,7 @@ class PageFilter {
     ForEach([&](size_t k, const Texel& texel) { grid_.At(texel.x, texel.y).variance = pooled[k]; });
     ForEach([&](size_t, const Texel& texel) {
       SmoothCell& cell = grid_.At(texel.x, texel.y);
-      if (cell.known) cell.radius = static_cast<int8_t>(grid_.Choose(texel.x, texel.y));
+      if (cell.known) cell.radius = grid_.Choose(texel.x, texel.y);
     });
     std::vector<LightPart> smooth(texels_.size());
     std::vector<uint8_t> changed(texels_.size(), 0);
@@ -68,9 +68,9 @@ class PageFilter {
 
   bool Smooth(const Texel& texel, LightPart& result) const {
     if (!grid_.At(texel.x, texel.y).known) return false;
-    const int radius = grid_.Agree(texel.x, texel.y);
+    const SmoothGrid::Window window = grid_.WindowOf(texel.x, texel.y, grid_.Agree(texel.x, texel.y));
+    const int radius = window.radius;
     if (radius == 0) return false;
-    const SmoothGrid::Window window = grid_.WindowOf(texel.x, texel.y, radius);
     for (int dy = -radius; dy <= radius; ++dy) {
       for (int dx = -radius; dx <= radius; ++dx) {
         const float weight = window.At(dx, dy);

@@ -231,12 +231,8 @@ class TileGatherer {
     ForEachCell([&](size_t i, int x, int y) { result[i].variance = grid_.PooledVariance(x, y); });
     ForEachCell([&](size_t i, int, int) { CellOf(i).variance = result[i].variance; });
     std::vector<SmoothGrid::Steps> steps(work_.size());
-    ForEachCell([&](size_t i, int x, int y) { CellOf(i).radius = static_cast<int8_t>(grid_.Choose(x, y, &steps[i])); });
-    ForEachCell([&](size_t i, int x, int y) {
-      const int radius = grid_.Agree(x, y);
-      const SmoothGrid::Smoothed& known = steps[i][static_cast<size_t>(radius)];
-      result[i] = known.variance >= 0 ? known : grid_.SmoothedAt(x, y, radius);
-    });
+    ForEachCell([&](size_t i, int x, int y) { CellOf(i).radius = grid_.Choose(x, y, &steps[i]); });
+    ForEachCell([&](size_t i, int x, int y) { result[i] = grid_.SmoothedAt(x, y, grid_.Agree(x, y), steps[i]); });
     return result;
   }
 
