@@ -23,13 +23,13 @@ struct KindName {
   const char* kind;
   uint32_t code_version;
 };
-inline constexpr KindName kChart{"chart/layout", 1};
+inline constexpr KindName kChart{"chart/layout", 2};
 inline constexpr KindName kSurvey{"texel/survey", 1};
-inline constexpr KindName kEmit{"photon/emit", 1};
+inline constexpr KindName kEmit{"photon/emit", 2};
 inline constexpr KindName kDensity{"photon/density", 1};
-inline constexpr KindName kGather{"gather/tiles", 1};
-inline constexpr KindName kFinish{"finish/page", 1};
-inline constexpr KindName kReport{"finish/report", 1};
+inline constexpr KindName kGather{"gather/tiles", 2};
+inline constexpr KindName kFinish{"finish/page", 2};
+inline constexpr KindName kReport{"finish/report", 2};
 
 // TaskSpec::settings of all of them. `settings_json` is proto/settings.h SettingsJson() of the settings that the kind
 // looks at, the others being the defaults.

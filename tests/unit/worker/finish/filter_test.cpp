@@ -1,0 +1,86 @@
+#include "worker/finish/filter.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/statistics.h"
+
+namespace bakewell {
+namespace {
+
+constexpr int kSide = 24;
+
+// A page of one chart whose indirect light is `mean` with noise, and whose direct light is 10.
+struct NoisyPage {
+  TexelMap map;
+  std::vector<TexelLight> lights;
+
+  explicit NoisyPage(float mean) {
+    TestRandom random(7);
+    map.pages = {{kSide, kSide}};
+    map.texel_at.emplace_back(kSide * kSide, -1);
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) {
+        Texel texel;
+        texel.x = x;
+        texel.y = y;
+        texel.chart = 0;
+        map.texel_at[0][static_cast<size_t>(y * kSide + x)] = static_cast<int32_t>(map.texels.size());
+        map.texels.push_back(texel);
+        TexelLight light;
+        light.open = static_cast<uint8_t>((x + 1 < kSide ? 1 : 0) | (x + 1 < kSide && y + 1 < kSide ? 2 : 0) |
+                                          (y + 1 < kSide ? 4 : 0) | (x > 0 && y + 1 < kSide ? 8 : 0));
+        const float e = mean * random.Between(0, 2);
+        light.indirect.irradiance = {e, 2 * e, 3 * e};
+        light.indirect.sh.lambda[3] = {e, e, 4 * e};
+        light.indirect.variance = Rgb{1, 4, 9} * (mean * mean / 3);
+        light.irradiance = light.indirect.irradiance + Rgb{10, 10, 10};
+        light.sh.lambda[3] = light.indirect.sh.lambda[3] + Rgb{1, 1, 1};
+        light.variance = light.indirect.variance;
+        lights.push_back(light);
+      }
+    }
+  }
+};
+
+double Sum(const std::vector<TexelLight>& lights) {
+  double sum = 0;
+  for (const TexelLight& light : lights) sum += static_cast<double>(Luminance(light.irradiance));
+  return sum;
+}
+
+TEST(FilterPage, SmoothsIndirectLightKeepsItsSumAndWeighsShTheSame) {
+  NoisyPage page(1);
+  const double before = Sum(page.lights);
+  FilterCounters counters;
+  FilterPage(page.map, 0, page.lights, counters);
+  EXPECT_GT(counters.filtered, kSide * kSide / 2);
+  EXPECT_NEAR(Sum(page.lights) / before, 1, 1e-4);
+  double variance = 0, claimed = 0;
+  for (const TexelLight& light : page.lights) {
+    const double d = static_cast<double>(light.irradiance.x) - 11;
+    variance += d * d / (kSide * kSide);
+    claimed += static_cast<double>(light.variance.x) / (kSide * kSide);
+    // The SH here is a multiple of the irradiance, texel by texel; so it has to be afterwards.
+    EXPECT_NEAR(light.sh.lambda[3].z - 1, 4 * (light.irradiance.x - 10), 1e-4f);
+  }
+  EXPECT_LT(variance, 0.1 / 3);
+  EXPECT_LT(claimed, 0.1 / 3);
+  EXPECT_GT(claimed, variance / 4);
+}
+
+TEST(FilterPage, InvalidTexelsAreNoEvidence) {
+  NoisyPage page(1);
+  for (size_t i = 0; i < page.lights.size(); ++i) {
+    if (page.map.texels[i].x < 12) continue;
+    page.lights[i].valid = false;
+    page.lights[i].indirect.irradiance = page.lights[i].irradiance = {1e6f, 1e6f, 1e6f};
+  }
+  FilterCounters counters;
+  FilterPage(page.map, 0, page.lights, counters);
+  for (size_t i = 0; i < page.lights.size(); ++i) {
+    EXPECT_TRUE(!page.lights[i].valid || page.lights[i].irradiance.z < 100);
+  }
+}
+
+}  // namespace
+}  // namespace bakewell
