@@ -31,7 +31,7 @@ struct Effort {
   int finalists;      // of those, the ones that get a density search
   int tilts;
 };
-constexpr Effort kNormalEffort{5, 108, 8, 1, 2}, kBruteEffort{12, 432, 32, 4, 4};
+constexpr Effort kNormalEffort{5, 108, 8, 2, 3}, kBruteEffort{12, 432, 32, 4, 4};
 
 struct Plan {
   Order order;
