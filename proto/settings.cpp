@@ -134,6 +134,7 @@ absl::StatusOr<Environment> EnvironmentOf(const v1::Environment& message, const 
 v1::BakeSettings ProtoFromSettings(const BakeSettings& settings) {
   v1::BakeSettings message;
   message.set_uv(ProtoUv(settings.uv));
+  message.set_density(settings.density == DensityMode::kSignal ? v1::BakeSettings::SIGNAL : v1::BakeSettings::UNIFORM);
   message.set_resolution(settings.resolution);
   message.set_texels_per_metre(settings.texels_per_metre);
   message.set_backfaces(ProtoBackfaces(settings.backfaces));
@@ -154,6 +155,7 @@ v1::BakeSettings ProtoFromSettings(const BakeSettings& settings) {
 absl::StatusOr<BakeSettings> SettingsFromProto(const v1::BakeSettings& message, const LatLongReader& read_latlong) {
   BakeSettings settings;
   settings.uv = UvOf(message.uv());
+  settings.density = message.density() == v1::BakeSettings::SIGNAL ? DensityMode::kSignal : DensityMode::kUniform;
   settings.resolution = message.resolution();
   settings.texels_per_metre = message.texels_per_metre();
   settings.backfaces = BackfacesOf(message.backfaces());

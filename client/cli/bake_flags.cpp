@@ -18,6 +18,12 @@ const std::map<std::string, UvMode>& UvNames() {
   return names;
 }
 
+const std::map<std::string, DensityMode>& DensityNames() {
+  static const std::map<std::string, DensityMode> names = {{"signal", DensityMode::kSignal},
+                                                           {"uniform", DensityMode::kUniform}};
+  return names;
+}
+
 const std::map<std::string, Quality>& QualityNames() {
   static const std::map<std::string, Quality> names = {
       {"high", Quality::kHigh}, {"medium", Quality::kMedium}, {"preview", Quality::kPreview}};
@@ -58,6 +64,11 @@ void AddSharedFlags(CLI::App& command, BakeFlags& flags) {
   command.add_option("--settings", flags.settings_file, "Settings as a JSON file; the other flags override it");
   command.add_option("--uv", flags.uv, "keep TEXCOORD_1, generate charts, or auto: keep where all have it")
       ->check(OneOf(UvNames()));
+  command
+      .add_option("--density", flags.density,
+                  "Of generated charts: uniform, or signal: finer where a preview of the light changes, coarser where "
+                  "it does not, with as many texels")
+      ->check(OneOf(DensityNames()));
   command.add_option("--resolution", flags.resolution, "Side of a page in texels");
   command.add_option("--texels-per-metre", flags.texels_per_metre, "Density; pages follow");
   command.add_option("--backfaces", flags.backfaces, "What back faces do to light")->check(OneOf(BackfaceNames()));
@@ -87,6 +98,7 @@ void AddReferenceOnlyFlags(CLI::App& command, BakeFlags& flags) {
 absl::StatusOr<BakeSettings> SettingsFromFlags(const BakeFlags& flags) {
   BAKEWELL_ASSIGN_OR_RETURN(BakeSettings settings, BaseSettings(flags.settings_file));
   if (flags.uv) settings.uv = UvNames().at(*flags.uv);
+  if (flags.density) settings.density = DensityNames().at(*flags.density);
   if (flags.quality) settings.quality = QualityNames().at(*flags.quality);
   if (flags.backfaces) settings.backfaces = BackfaceNames().at(*flags.backfaces);
   settings.resolution = flags.resolution.value_or(settings.resolution);

@@ -19,7 +19,7 @@ struct BakeFlags {
   bool json = false;
   int spp = 1024;  // reference only
 
-  std::optional<std::string> uv, quality, backfaces, environment;
+  std::optional<std::string> uv, density, quality, backfaces, environment;
   std::optional<int> resolution, max_samples, photon_batches;
   bool no_filter = false;
   std::optional<float> texels_per_metre, target_error, albedo_limit, footprint;

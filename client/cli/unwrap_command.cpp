@@ -62,6 +62,8 @@ void AddPackFlags(CLI::App& command, chart::PackOptions& options) {
   command.add_option("--padding", options.padding, "Empty texels between any two charts");
   command.add_option("--texels-per-unit", options.texelsPerUnit, "Density; 0: as large as fills one page");
   command.add_option("--resolution", options.resolution, "Page side, never exceeded [texels]; 0: chosen");
+  command.add_option("--max-resolution", options.maxResolution,
+                     "Longest page side where the density is given and the resolution is not; 0: 8192");
   command.add_flag("--bilinear,!--no-bilinear", options.bilinear, "Keep bilinear filtering inside a chart's gutter");
   command.add_flag("--block-align,!--no-block-align", options.blockAlign, "No two charts share a 4x4 block");
   command.add_flag("--brute-force,!--no-brute-force", options.bruteForce, "Search longer for a denser packing");

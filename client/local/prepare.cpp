@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "client/local/level_bake.h"
+#include "client/local/signal_density.h"
 #include "core/scene/canonical.h"
 #include "server/chart/choose.h"
 
@@ -62,6 +63,9 @@ absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings
   if (prepared.texels.texels.empty()) {
     return absl::InvalidArgumentError(
         "no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");
+  }
+  if (settings.density == DensityMode::kSignal) {
+    BAKEWELL_RETURN_IF_ERROR(FollowSignal(settings, clock, progress, prepared));
   }
   return prepared;
 }

@@ -11,7 +11,7 @@ namespace bakewell {
 class Progress {
  public:
   virtual ~Progress() = default;
-  // `phase` is one of chart, texels, photons, density, gather, finish, write. Units of work, done <= total.
+  // `phase` is one of chart, texels, preview, photons, density, gather, finish, write. Units of work, done <= total.
   virtual void Report(std::string_view phase, int64_t done, int64_t total) = 0;
 
   void Cancel() { cancelled_.store(true, std::memory_order_relaxed); }

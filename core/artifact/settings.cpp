@@ -35,6 +35,9 @@ absl::Status CheckPage(const BakeSettings& settings) {
   if (!(density >= 0 && density <= kDensestTexelsPerMetre)) {
     return Refuse("texels_per_metre", "above 0 and at most 10000, or 0", density);
   }
+  if (settings.density == DensityMode::kSignal && settings.uv == UvMode::kKeep) {
+    return absl::InvalidArgumentError("density must be uniform where uv is keep: only generated charts can change");
+  }
   return absl::OkStatus();
 }
 

@@ -9,6 +9,8 @@
 namespace bakewell {
 
 enum class UvMode : uint8_t { kAuto, kKeep, kGenerate };  // auto: keep where every lightmapped object has TEXCOORD_1
+// Texel density of generated charts: one for all, or after a preview of the light (client/local/signal_density.h).
+enum class DensityMode : uint8_t { kUniform, kSignal };
 enum class BackfaceMode : uint8_t { kReflect, kAbsorb, kPass };
 enum class Quality : uint8_t { kPreview, kMedium, kHigh };
 
@@ -16,6 +18,7 @@ enum class Quality : uint8_t { kPreview, kMedium, kHigh };
 // me" where it says so.
 struct BakeSettings {
   UvMode uv = UvMode::kAuto;
+  DensityMode density = DensityMode::kUniform;  // kSignal: not with UvMode::kKeep, and not on a farm
   int resolution = 0;          // page side in texels; 0: scene.extras.lightmap, else from texels_per_metre
   float texels_per_metre = 0;  // 0: from resolution, else 8
   float footprint = 0.5f;      // side of the square about a texel's centre that its value averages [texels], (0, 1]

@@ -135,6 +135,8 @@ absl::Status CheckOptions(const PackOptions& options) {
   if (options.resolution > 8192) return absl::InvalidArgumentError("resolution must not be above 8192");
   if (options.resolution > 0 && options.resolution < 16)
     return absl::InvalidArgumentError("resolution must be 0 or at least 16");
+  if (options.maxResolution > 8192 || (options.maxResolution > 0 && options.maxResolution < 16))
+    return absl::InvalidArgumentError("maxResolution must be 0 or 16 to 8192");
   if (options.padding > 256) return absl::InvalidArgumentError("padding must not be above 256");
   if (!(options.texelsPerUnit >= 0)) return absl::InvalidArgumentError("texelsPerUnit must not be negative");
   return absl::OkStatus();

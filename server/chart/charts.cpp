@@ -4,6 +4,7 @@
 
 #include "server/chart/atlas.h"
 #include "server/chart/flatten/flatten.h"
+#include "server/chart/flatten/stretch.h"
 #include "server/chart/input_uv.h"
 #include "server/chart/pack/orient.h"
 #include "server/chart/segment/relax.h"
@@ -13,6 +14,8 @@ namespace bakewell::chart {
 namespace {
 
 constexpr uint32_t kMaxComparedFaces = 150000;
+// A chart may stretch (l2 - 1) this many times as much as its mesh does on average, or this share of maxStretch - 1.
+constexpr double kMaxStretchOfMean = 5, kFreeStretchShare = 0.25;
 constexpr double kLeastFillGain = 0.02, kMaxMoreCharts = 1.25;
 
 absl::Status CheckIndices(std::span<const MeshDecl> meshes) {
@@ -42,14 +45,39 @@ std::vector<std::vector<uint32_t>> FacesOf(const std::vector<uint32_t>& label) {
   return faces;
 }
 
-std::vector<FlatChart> FlattenAll(const Surface& surface, const std::vector<uint32_t>& label,
-                                  const ChartOptions& options) {
-  const auto segments = FacesOf(label);
+std::vector<FlatChart> FlattenEach(const Surface& surface, const std::vector<std::vector<uint32_t>>& segments,
+                                   const ChartOptions& options) {
   std::vector<std::vector<FlatChart>> flat(segments.size());
   tbb::parallel_for(size_t{0}, segments.size(), [&](size_t i) { flat[i] = Flatten(surface, segments[i], options); });
   std::vector<FlatChart> charts;
   for (auto& part : flat)
     for (FlatChart& chart : part) charts.push_back(std::move(chart));
+  return charts;
+}
+
+// Area-weighted mean of l2 - 1.
+double MeanStretch(const Surface& surface, std::span<const FlatChart> charts, std::span<const double> excess) {
+  double sum = 0, area = 0;
+  for (size_t i = 0; i < charts.size(); ++i)
+    for (const uint32_t f : charts[i].face) sum += surface.area[f] * excess[i], area += surface.area[f];
+  return area > 0 ? sum / area : 0;
+}
+
+// Where most of a mesh is flat, a few curved charts at the bound make up its stretch: they are cut up.
+std::vector<FlatChart> FlattenAll(const Surface& surface, const std::vector<uint32_t>& label,
+                                  const ChartOptions& options) {
+  std::vector<FlatChart> charts = FlattenEach(surface, FacesOf(label), options);
+  std::vector<double> excess(charts.size());
+  tbb::parallel_for(size_t{0}, charts.size(), [&](size_t i) { excess[i] = MeasureStretch(surface, charts[i]).l2 - 1; });
+  ChartOptions tighter = options;
+  const double limit = std::max(kMaxStretchOfMean * MeanStretch(surface, charts, excess),
+                                kFreeStretchShare * (double{options.maxStretch} - 1));
+  tighter.maxStretch = static_cast<float>(1 + limit);
+  std::vector<std::vector<uint32_t>> stretched;
+  for (size_t i = 0; i < charts.size(); ++i)
+    if (excess[i] > limit) stretched.push_back(std::move(charts[i].face));
+  std::erase_if(charts, [](const FlatChart& chart) { return chart.face.empty(); });
+  for (FlatChart& chart : FlattenEach(surface, stretched, tighter)) charts.push_back(std::move(chart));
   return charts;
 }
 

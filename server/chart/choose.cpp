@@ -51,13 +51,18 @@ PageSize KeptPage(const Scene& scene, const BakeSettings& settings) {
 
 }  // namespace
 
-absl::StatusOr<AtlasLayout> ChooseCharts(const Scene& scene, const BakeSettings& settings) {
-  const bool keep = settings.uv == UvMode::kKeep || (settings.uv == UvMode::kAuto && HasOwnCharts(scene));
-  if (keep) return KeepCharts(scene, KeptPage(scene, settings));
+bool KeepsCharts(const Scene& scene, const BakeSettings& settings) {
+  return settings.uv == UvMode::kKeep || (settings.uv == UvMode::kAuto && HasOwnCharts(scene));
+}
+
+absl::StatusOr<AtlasLayout> ChooseCharts(const Scene& scene, const BakeSettings& settings,
+                                         std::span<const float> chart_density) {
+  if (KeepsCharts(scene, settings)) return KeepCharts(scene, KeptPage(scene, settings));
   GenerateOptions options;
   options.resolution = settings.resolution;
   options.texels_per_metre = settings.texels_per_metre;
   if (options.resolution == 0 && options.texels_per_metre <= 0) options.texels_per_metre = kDefaultTexelsPerMetre;
+  options.chart_density.assign(chart_density.begin(), chart_density.end());
   return GenerateCharts(scene, options);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -10,8 +11,13 @@
 
 namespace bakewell {
 
+// Whether the settings ask for the scene's own charts.
+bool KeepsCharts(const Scene& scene, const BakeSettings& settings);
+
 // The charts that the settings ask for: the scene's own (KeepCharts) or new ones (GenerateCharts). Errors as theirs.
-absl::StatusOr<AtlasLayout> ChooseCharts(const Scene& scene, const BakeSettings& settings);
+// Settings' density is not looked at; chart_density: GenerateOptions::chart_density for new charts.
+absl::StatusOr<AtlasLayout> ChooseCharts(const Scene& scene, const BakeSettings& settings,
+                                         std::span<const float> chart_density = {});
 
 // The same as the task chart/layout (core/artifact/level_task.h): its settings and SerializeScene() bytes in,
 // SerializeLayout() bytes out. Safe on hostile bytes.

@@ -77,7 +77,10 @@ AtlasLayout ToLayout(const chart::Atlas& atlas, std::span<const int> mesh_of_obj
 absl::StatusOr<AtlasLayout> GenerateCharts(const Scene& scene, const GenerateOptions& options) {
   BAKEWELL_ASSIGN_OR_RETURN(const std::vector<chart::MeshDecl> meshes, LightmappedMeshes(scene));
   chart::PackOptions pack = options.pack;
-  pack.resolution = static_cast<uint32_t>(options.resolution > 0 ? options.resolution : options.max_resolution);
+  const bool free_side = options.resolution <= 0 && options.texels_per_metre > 0;
+  const int side = options.resolution > 0 ? options.resolution : options.max_resolution;
+  pack.resolution = static_cast<uint32_t>(free_side ? 0 : side);
+  pack.maxResolution = static_cast<uint32_t>(options.max_resolution);
   pack.texelsPerUnit = options.texels_per_metre;
   BAKEWELL_ASSIGN_OR_RETURN(std::vector<chart::MeshCharts> charts, chart::ComputeCharts(meshes, options.chart));
   BAKEWELL_RETURN_IF_ERROR(ApplyDensities(options.chart_density, charts));

@@ -26,6 +26,8 @@ struct PackOptions {
   uint32_t padding = 2;            // empty texels between any two charts
   float texelsPerUnit = 0;         // density; 0: searched so that one page of `resolution` is full
   uint32_t resolution = 0;         // page side, never exceeded; 0: 1024 if texelsPerUnit is 0, else what one page needs
+  uint32_t maxResolution = 0;      // ours: longest page side where resolution is 0 and texelsPerUnit is not; what one
+                                   // such page cannot hold goes on several, all as small as they can be; 0: 8192
   bool bilinear = true;            // a gutter of at least 2, so that no filter tap on a chart reads another
   bool blockAlign = false;         // no two charts share a 4x4 block
   bool bruteForce = false;         // search longer for a denser packing

@@ -163,6 +163,11 @@ absl::StatusOr<BakeSettings> ReadSettings(const std::string& bytes) {
   if (message.has_environment()) {
     return absl::InvalidArgumentError("settings: the environment belongs into the scene that is submitted");
   }
+  if (message.density() == v1::BakeSettings::SIGNAL) {
+    return absl::InvalidArgumentError(
+        "settings: density SIGNAL needs a preview before the charts, which a farm does not plan: bake it with "
+        "`bakewell bake`, or submit with density UNIFORM");
+  }
   return SettingsFromProto(message, [](const std::string&) -> absl::StatusOr<Environment> {
     return absl::InvalidArgumentError("settings: a coordinator reads no files");
   });

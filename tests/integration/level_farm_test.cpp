@@ -78,6 +78,10 @@ TEST(LevelFarm, HostileSettingsAndScenesAreRefusedAtSubmit) {
   // Field 999, which no version has.
   EXPECT_EQ(plan::ReadSettings("\xb8\x3e\x01").status().code(), absl::StatusCode::kInvalidArgument);
   BakeSettings settings;
+  settings.density = DensityMode::kSignal;
+  EXPECT_EQ(plan::ReadSettings(ProtoFromSettings(settings).SerializeAsString()).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  settings.density = DensityMode::kUniform;
   settings.resolution = -5;
   EXPECT_EQ(plan::ReadSettings(ProtoFromSettings(settings).SerializeAsString()).status().code(),
             absl::StatusCode::kInvalidArgument);

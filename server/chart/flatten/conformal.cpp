@@ -9,6 +9,10 @@ namespace {
 
 using Matrix = Eigen::SparseMatrix<double>;
 
+// Of boundary vertices whose squared distances differ by less than this share the first counts as farthest, whatever
+// rounding says.
+constexpr double kFartherShare = 1e-4;
+
 // The boundary vertex farthest from a vertex in space.
 uint32_t FarthestFrom(const Surface& surface, const FlatChart& chart, const std::vector<BoundaryEdge>& boundary,
                       uint32_t from) {
@@ -16,7 +20,7 @@ uint32_t FarthestFrom(const Surface& surface, const FlatChart& chart, const std:
   double farthest = 0;
   for (const auto& edge : boundary) {
     const Vec3d d = surface.position[chart.vertex[edge.a]] - surface.position[chart.vertex[from]];
-    if (Dot(d, d) > farthest) farthest = Dot(d, d), best = edge.a;
+    if (Dot(d, d) > farthest * (1 + kFartherShare)) farthest = Dot(d, d), best = edge.a;
   }
   return best;
 }

@@ -5,6 +5,8 @@
 #include <queue>
 #include <tuple>
 
+#include "server/chart/keyed_random.h"
+
 namespace bakewell::chart {
 namespace {
 
@@ -58,7 +60,8 @@ Growth Grow(const Surface& surface, const Members& members, std::span<const uint
       const uint32_t j = members.IndexOf(other);
       if (j == kNone || growth.owner[j] != kNone) continue;
       const double turn = 1 - Dot(surface.normal[members[i]], surface.normal[other]);
-      const double step = Length(Centroid(surface, members[i]) - Centroid(surface, other));
+      const double step =
+          UntiedStep(Length(Centroid(surface, members[i]) - Centroid(surface, other)), members[i], other);
       queue.emplace(distance + step * (1 + kTurnPenalty * turn), j, seed);
     }
   }

@@ -1,6 +1,7 @@
 #include "server/chart/mesh/pairing.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <tuple>
 
@@ -55,8 +56,12 @@ void JoinEdge(UnionFind& corners, const HalfEdge& a, const HalfEdge& b) {
   corners.Join(Next(a.corner), b.corner);
 }
 
+// Angles whose cosines differ by less are equally flat, whatever rounding says. A power of two and a whole number of
+// steps from each of 0, 1/2 and 1, so that the angles of regular meshes do not lie where rounding to steps turns over.
+constexpr double kFlatnessStep = 0x1p-12;
+
 struct Candidate {
-  double flatness;
+  double flatness;  // in whole steps
   uint32_t a, b;
 };
 
@@ -66,7 +71,8 @@ std::vector<Candidate> OppositePairs(std::span<const HalfEdge> group, std::span<
   for (uint32_t i = 0; i < group.size(); ++i)
     for (uint32_t j = i + 1; j < group.size(); ++j)
       if (group[i].forward != group[j].forward)
-        pairs.push_back({Dot(normal[group[i].corner / 3], normal[group[j].corner / 3]), i, j});
+        pairs.push_back(
+            {std::round(Dot(normal[group[i].corner / 3], normal[group[j].corner / 3]) / kFlatnessStep), i, j});
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const Candidate& x, const Candidate& y) { return x.flatness > y.flatness; });
   return pairs;

@@ -20,6 +20,9 @@ constexpr int kDefaultSide = 1024;
 constexpr int kMaxSide = 8192;
 constexpr int kMaxPages = 256;
 constexpr int kMaxTrials = 40;
+// Page widths that are tried where they are free: sqrt(texels) * 2^(kLeastWidth + i * kWidthStep).
+constexpr int kFreeWidths = 12;
+constexpr double kLeastWidth = -0.5, kWidthStep = 0.15;
 // Side of the coarse pages on which plans are compared: a quarter of the page's, within bounds [cells].
 constexpr double kSketchShare = 0.25, kLeastSketch = 48, kLargestSketch = 256;
 
@@ -31,7 +34,7 @@ struct Effort {
   int finalists;      // of those, the ones that get a density search
   int tilts;
 };
-constexpr Effort kNormalEffort{5, 108, 8, 1, 2}, kBruteEffort{12, 432, 32, 4, 4};
+constexpr Effort kNormalEffort{5, 108, 8, 2, 3}, kBruteEffort{12, 432, 32, 4, 4};
 
 struct Plan {
   Order order;
@@ -182,22 +185,52 @@ absl::StatusOr<PackResult> PackPages(std::span<const PackItem> items, const Rast
   return ToResult({std::move(trial), grid, raster}, grid.width * raster.cell, grid.height * raster.cell);
 }
 
-// Given density, free side: one page as large as need be.
-absl::StatusOr<PackResult> PackOnePage(std::span<const PackItem> items, const Raster& raster) {
-  double demand = 0, longest = 1;
-  for (const PackItem& item : items) {
-    demand += Demand(item, raster.texels_per_unit, raster.gutter);
-    longest =
-        std::max(longest, std::hypot(item.size.x, item.size.y) * raster.texels_per_unit * item.density + 2 * kBlock);
-  }
-  const double side = std::min<double>(kMaxSide, std::max(std::sqrt(demand * 1.1), longest));
-  const int width = RoundUp(static_cast<int>(side), kBlock) / raster.cell;
-  const Grid grid{width, 2 * width, MaxPages(items)};
-  Trial trial = PlaceAll(grid, MakeCandidates(items, raster), {});
-  if (!trial.complete) return TooManyPages(raster);
+// One page in a grid of this width, cut to what it uses (whole blocks); nothing where it does not fit.
+std::optional<PackResult> PackWidth(std::span<const Candidate> candidates, const Raster& raster, int width, int side) {
+  const Grid grid{width / raster.cell, side / raster.cell, 1};
+  Trial trial = PlaceAll(grid, candidates, {});
+  if (!trial.complete) return std::nullopt;
   const int used_width = RoundUp(trial.used_width * raster.cell, kBlock);
   const int used_height = RoundUp(trial.used_height * raster.cell, kBlock);
   return ToResult({std::move(trial), grid, raster}, used_width, used_height);
+}
+
+// Several equal pages `side` wide, no higher than it takes for that number of pages.
+absl::StatusOr<PackResult> PackFewestPages(std::span<const PackItem> items, const Raster& raster, int side) {
+  BAKEWELL_ASSIGN_OR_RETURN(PackResult best, PackPages(items, raster, side));
+  const std::vector<Candidate> candidates = MakeCandidates(items, raster);
+  int low = 0, high = side / kBlock;  // page heights in blocks: too low, enough
+  while (high - low > std::max(1, side / kBlock / 64)) {
+    const int middle = (low + high) / 2;
+    const Grid grid{side / raster.cell, middle * kBlock / raster.cell, best.pages};
+    Trial trial = PlaceAll(grid, candidates, {});
+    (trial.complete ? high : low) = middle;
+    if (trial.complete) best = ToResult({std::move(trial), grid, raster}, side, middle * kBlock);
+  }
+  return best;
+}
+
+// Given density, free side: the page of least area that holds all, or as few and small pages as it takes.
+absl::StatusOr<PackResult> PackFreeSide(std::span<const PackItem> items, const Raster& raster, int side) {
+  double demand = 0;
+  for (const PackItem& item : items) demand += Demand(item, raster.texels_per_unit, raster.gutter);
+  const std::vector<Candidate> candidates = MakeCandidates(items, raster);
+  std::optional<PackResult> best;
+  int last_width = 0;
+  for (int i = 0; i < kFreeWidths; ++i) {
+    const double width = std::sqrt(demand) * std::exp2(kLeastWidth + kWidthStep * i);
+    const int rounded = RoundUp(static_cast<int>(std::min<double>(width, side)), kBlock);
+    if (rounded > side || rounded == last_width) continue;
+    last_width = rounded;
+    std::optional<PackResult> page = PackWidth(candidates, raster, rounded, side);
+    if (page && (!best || page->width * page->height < best->width * best->height)) best = std::move(page);
+  }
+  if (best) return *std::move(best);
+  return PackFewestPages(items, raster, side);
+}
+
+int MaxSide(const PackOptions& options) {
+  return options.maxResolution > 0 ? static_cast<int>(options.maxResolution) / kBlock * kBlock : kMaxSide;
 }
 
 Raster RasterFor(const PackOptions& options, int side) {
@@ -220,7 +253,7 @@ absl::StatusOr<PackResult> Pack(std::span<const PackItem> items, const PackOptio
   const bool free_side = options.resolution == 0;
   const int side = free_side ? kDefaultSide : static_cast<int>(options.resolution);
   if (options.texelsPerUnit > 0)
-    return free_side ? PackOnePage(items, RasterFor(options, kMaxSide))
+    return free_side ? PackFreeSide(items, RasterFor(options, MaxSide(options)), MaxSide(options))
                      : PackPages(items, RasterFor(options, side), side);
 
   const double texels = double(side) * side;

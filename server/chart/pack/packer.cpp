@@ -6,17 +6,10 @@
 #include <map>
 #include <numeric>
 
+#include "server/chart/keyed_random.h"
+
 namespace bakewell::chart {
 namespace {
-
-// A number in [-1, 1) from a key.
-double KeyedRandom(uint32_t seed, uint32_t i) {
-  uint64_t h = (uint64_t{seed} << 32 | i) * 0x9E3779B97F4A7C15ull;
-  h ^= h >> 32;
-  h *= 0xD6E8FEB86659FD93ull;
-  h ^= h >> 32;
-  return double(h >> 11) * 0x1p-52 - 1;
-}
 
 std::vector<uint32_t> PlacingOrder(std::span<const Candidate> candidates, const Order& order) {
   std::vector<double> rank(candidates.size());

@@ -58,6 +58,7 @@ RegionGraph::RegionGraph(const Surface& surface, std::span<const uint8_t> seam)
   for (uint32_t f = 0; f < surface.FaceCount(); ++f) {
     regions_[f].area_normal = surface.normal[f] * surface.area[f];
     regions_[f].area = surface.area[f];
+    regions_[f].first = f;
     for (int k = 0; k < 3; ++k) {
       regions_[f].outline += surface.EdgeLength(f, k);
       if (surface.across[f][k] != kNone && f < surface.across[f][k])
@@ -79,6 +80,8 @@ void RegionGraph::AddEdge(const Surface& surface, uint32_t f, int k, bool seam) 
   const double length = surface.EdgeLength(f, k);
   const double crease = 1 - Dot(surface.normal[f], surface.normal[other]);
   links_[link].length += length;
+  ++links_[link].edges;
+  links_[link].sharpest = std::max(links_[link].sharpest, crease);
   links_[link].crease += length * crease;
   if (crease > kSharpCrease) links_[link].sharp += length;
   if (seam) links_[link].texture_seam += length;
@@ -96,6 +99,8 @@ std::vector<uint32_t> RegionGraph::Merge(uint32_t link) {
   regions_[large].area += regions_[small].area;
   regions_[large].faces += regions_[small].faces;
   regions_[large].outline = std::max(0.0, regions_[large].outline + regions_[small].outline - 2 * links_[link].length);
+  regions_[large].edges = regions_[large].edges + regions_[small].edges - 2 * links_[link].edges;
+  regions_[large].first = std::min(regions_[large].first, regions_[small].first);
   parent_[small] = large;
   links_[link].alive = false;
 
@@ -108,6 +113,8 @@ std::vector<uint32_t> RegionGraph::Merge(uint32_t link) {
     if (existing != kNone && links_[existing].alive) {
       Link& kept = links_[existing];
       kept.length += moved.length;
+      kept.edges += moved.edges;
+      kept.sharpest = std::max(kept.sharpest, moved.sharpest);
       kept.crease += moved.crease;
       kept.sharp += moved.sharp;
       kept.texture_seam += moved.texture_seam;

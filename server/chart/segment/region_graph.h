@@ -14,13 +14,17 @@ struct Region {
   double area = 0;
   double outline = 0;  // length of its border
   uint32_t faces = 1;
+  uint32_t edges = 3;  // of its border
+  uint32_t first = 0;  // its least face: a name that the order of merges does not change
 };
 
 // The border that two regions share.
 struct Link {
   uint32_t a = 0, b = 0;    // regions
   double length = 0;        // sum of edge lengths
+  uint32_t edges = 0;       // how many
   double crease = 0;        // sum of length * (1 - cos of the dihedral angle)
+  double sharpest = 0;      // largest 1 - cos of the dihedral angle
   double sharp = 0;         // sum of lengths of edges that turn by more than 30 degrees
   double texture_seam = 0;  // sum of lengths that are seams of the input UVs
   bool alive = true;

@@ -6,6 +6,8 @@
 #include <queue>
 #include <tuple>
 
+#include "server/chart/keyed_random.h"
+
 namespace bakewell::chart {
 namespace {
 
@@ -48,6 +50,8 @@ class Relaxation {
  private:
   double Turn(uint32_t f, uint32_t g) const { return 1 - Dot(surface_.normal[f], surface_.normal[g]); }
 
+  double Step(uint32_t f, uint32_t g) const { return UntiedStep(Length(centroid_[g] - centroid_[f]), f, g); }
+
   bool OnBorder(uint32_t f) const {
     for (const uint32_t g : surface_.across[f])
       if (g == kNone || label_[g] != label_[f]) return true;
@@ -69,7 +73,7 @@ class Relaxation {
       innermost[e.label] = e.face;
       for (const uint32_t g : surface_.across[e.face])
         if (g != kNone && label_[g] == e.label && depth[g] == kInfinity)
-          queue.push({e.distance + Length(centroid_[g] - centroid_[e.face]), g, e.label});
+          queue.push({e.distance + Step(e.face, g), g, e.label});
     }
     return innermost;
   }
@@ -89,8 +93,8 @@ class Relaxation {
         const double turn = Turn(e.face, g);
         if (label_[g] != label_[e.face] && turn > kSharp) continue;
         const double deviation = 1 - Dot(surface_.normal[g], mean_[e.label]);
-        const double step = Length(centroid_[g] - centroid_[e.face]);
-        queue.push({e.distance + step * (1 + kTurnPenalty * turn + kDeviationPenalty * deviation), g, e.label});
+        queue.push(
+            {e.distance + Step(e.face, g) * (1 + kTurnPenalty * turn + kDeviationPenalty * deviation), g, e.label});
       }
     }
     for (uint32_t f = 0; f < label_.size(); ++f)

@@ -70,6 +70,23 @@ def scaled(name, factor):
     return path
 
 
+def charts_of(path):
+    """Per face, in the order of its corners, the least face of its chart (-1: none): the same for the same charts."""
+    group, face_group, seen = None, {}, {}
+    with open(path) as file:
+        for text in file:
+            if text.startswith("g "):
+                group = text.strip()
+            elif text.startswith("f "):
+                corners = tuple(int(word.split("/")[0]) for word in text.split()[1:])
+                seen[corners] = seen.get(corners, 0) + 1
+                face_group[corners, seen[corners]] = group
+    least = {}
+    for face in sorted(face_group):
+        least.setdefault(face_group[face], face)
+    return {face: -1 if name.startswith("g none") else least[name] for face, name in face_group.items()}
+
+
 def faults(row):
     found = ["%s %d" % (key, row[key]) for key in FAULTS if row[key]]
     if max(row["chart_dens_max"] - 1, 1 - row["chart_dens_min"]) > 0.01:
@@ -80,11 +97,14 @@ def faults(row):
 def variants(name, base):
     """The promises that one plain run cannot show: scale, resolution, blocks, fixed density on several pages."""
     found, fills = [], []
-    for factor in (0.001, 1000, 1 / 1024, 1024):
+    charts = charts_of(os.path.join(WORK, "out", "bakewell_%s.obj" % name))
+    for factor in (0.001, 1000, 0.01, 100, 1 / 1024, 1024):
         row = ours(name + "_scaled", scaled(name, factor))
         found += ["x%g: %s" % (factor, f) for f in faults(row)]
         fills.append("%d / %.3f" % (row["charts"], row["util_touched"]))
-        # A power of two changes no bit of the input's mantissas: the same texels. Others round it, and greedy choices may differ.
+        if charts_of(os.path.join(WORK, "out", "bakewell_%s_scaled.obj" % name)) != charts:
+            found.append("x%g: not the same charts" % factor)
+        # A power of two changes no bit of the input's mantissas: the same texels. Others round it: a texel at a chart's rim may go.
         if factor in (1 / 1024, 1024) and (row["charts"], row["util_touched"], row["L2"]) != (base["charts"], base["util_touched"], base["L2"]):
             found.append("x%g: not the same atlas" % factor)
     row = ours(name + "_512", mesh_path(name), "--resolution", "512", "--block-align")

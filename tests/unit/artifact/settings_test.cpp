@@ -25,6 +25,8 @@ TEST(ValidateSettings, EachSettingOutsideItsRangeIsNamed) {
             "texels_per_metre must be above 0 and at most 10000, or 0, not nan");
   EXPECT_EQ(message([](BakeSettings& s) { s.target_error = 1; }),
             "target_error must be a relative error below 1, or 0, not 1");
+  EXPECT_EQ(message([](BakeSettings& s) { s.density = DensityMode::kSignal, s.uv = UvMode::kKeep; }),
+            "density must be uniform where uv is keep: only generated charts can change");
   EXPECT_EQ(message([](BakeSettings& s) { s.max_samples = 100; }),
             "max_samples must be a power of two up to 1048576, or 0, not 100");
   EXPECT_EQ(message([](BakeSettings& s) { s.min_samples = 64, s.max_samples = 32; }),

@@ -94,6 +94,43 @@ TEST(GenerateCharts, TexelsPerMetreDecidesThePages) {
   EXPECT_EQ(layout->texels_per_metre, 50);
 }
 
+int64_t TexelsOf(const AtlasLayout& layout) {
+  int64_t texels = 0;
+  for (const PageSize& page : layout.pages) texels += int64_t{page.width} * page.height;
+  return texels;
+}
+
+// A small level got a page of 1024 x 1024, nearly empty.
+TEST(GenerateCharts, ASmallLevelGetsASmallPage) {
+  Scene scene;
+  for (int i = 0; i < 4; ++i) scene.objects.push_back(ObjectOf(chart::Box(), "box"));
+  const auto layout = GenerateCharts(scene, {.texels_per_metre = 50});
+  ASSERT_TRUE(layout.ok());
+  ASSERT_EQ(layout->pages.size(), 1u);
+  EXPECT_EQ(layout->pages[0].width % 4, 0);
+  EXPECT_EQ(layout->pages[0].height % 4, 0);
+  // 24 faces of 50 x 50 texels take 13 x 13 blocks with their gutter.
+  EXPECT_LE(TexelsOf(*layout), 24 * 52 * 52 * 5 / 4);
+  const auto fixed = GenerateCharts(scene, {.resolution = 512, .texels_per_metre = 50});
+  ASSERT_TRUE(fixed.ok());
+  EXPECT_EQ(fixed->pages, (std::vector<PageSize>{{512, 512}}));
+}
+
+// Four and a bit pages' worth took five whole pages.
+TEST(GenerateCharts, SeveralPagesAreNoLargerThanTheyNeed) {
+  Scene scene;
+  for (int i = 0; i < 11; ++i) scene.objects.push_back(ObjectOf(chart::Box(), "box"));
+  const auto layout = GenerateCharts(scene, {.texels_per_metre = 20, .max_resolution = 128});
+  ASSERT_TRUE(layout.ok());
+  EXPECT_EQ(layout->pages.size(), 3u);  // 66 faces of 20 x 20 texels, 24 x 24 with their gutter: 25 a page
+  EXPECT_EQ(layout->pages[0].width, 128);
+  EXPECT_LE(layout->pages[0].height, 124);
+  const auto more = GenerateCharts(scene, {.texels_per_metre = 28, .max_resolution = 128});
+  ASSERT_TRUE(more.ok());
+  EXPECT_EQ(more->pages.size(), 5u);  // 32 x 32: 16 a page, 66 / 5 = 13.2 need 4 rows
+  EXPECT_EQ(more->pages[0].height, 128);
+}
+
 TEST(GenerateCharts, ChartDensitiesMoveTexelsWithinThePage) {
   Scene scene;
   scene.objects = {ObjectOf(chart::Box(), "box")};

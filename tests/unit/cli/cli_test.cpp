@@ -61,7 +61,9 @@ TEST(CliBake, EveryFlagReachesTheRequest) {
                                "-o",
                                "there",
                                "--uv",
-                               "keep",
+                               "generate",
+                               "--density",
+                               "signal",
                                "--resolution",
                                "256",
                                "--texels-per-metre",
@@ -92,7 +94,8 @@ TEST(CliBake, EveryFlagReachesTheRequest) {
   EXPECT_EQ(run.bake->output_dir, "there");
   EXPECT_EQ(run.bake->threads, 2);
   const BakeSettings& settings = run.bake->settings;
-  EXPECT_EQ(settings.uv, UvMode::kKeep);
+  EXPECT_EQ(settings.uv, UvMode::kGenerate);
+  EXPECT_EQ(settings.density, DensityMode::kSignal);
   EXPECT_EQ(settings.resolution, 256);
   EXPECT_EQ(settings.texels_per_metre, 7.5f);
   EXPECT_EQ(settings.quality, Quality::kHigh);

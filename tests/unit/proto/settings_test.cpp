@@ -13,6 +13,7 @@ absl::StatusOr<Environment> NoPicture(const std::string& file) { return absl::No
 BakeSettings Unusual() {
   BakeSettings settings;
   settings.uv = UvMode::kGenerate;
+  settings.density = DensityMode::kSignal;
   settings.resolution = 512;
   settings.texels_per_metre = 7.25f;
   settings.backfaces = BackfaceMode::kPass;
@@ -40,6 +41,7 @@ TEST(Settings, JsonBringsEveryFieldBack) {
   EXPECT_EQ(read->uv, UvMode::kGenerate);
   EXPECT_EQ(read->albedo_limit, 0.9f);
   EXPECT_EQ(read->footprint, 0.75f);
+  EXPECT_EQ(read->density, DensityMode::kSignal);
   EXPECT_EQ(read->photons, int64_t{5} << 32);
   EXPECT_EQ(read->environment->horizon.y, 0.2f);
   EXPECT_EQ(SettingsJson(*read), json);  // and so all others
