@@ -66,8 +66,8 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
   BAKEWELL_ASSIGN_OR_RETURN(const Photons photons,
                             TracePhotons(prepared, settings, budget.photons, baked, clock, progress));
   clock.Begin("gather");
-  const LightSelector selector(*prepared.lights);
-  const GatherScene scene{*prepared.world, *prepared.lights, selector, photons.cells, photons.cache};
+  const LightTree tree(*prepared.lights);
+  const GatherScene scene{*prepared.world, *prepared.lights, tree, photons.cells, photons.cache};
   budget.gather.mean_irradiance = MeanIrradiance(prepared.texels, photons.cells, photons.cache);
   baked.lights.resize(prepared.texels.texels.size());
   const int tiles = prepared.texels.tile_count();

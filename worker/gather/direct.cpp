@@ -1,8 +1,6 @@
 #include "worker/gather/direct.h"
 
 #include <algorithm>
-#include <numeric>
-#include <tuple>
 
 #include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
@@ -11,72 +9,84 @@
 namespace bakewell {
 namespace {
 
-constexpr uint32_t kProbesPerLight = 8;
-constexpr size_t kMostProbed = 256;    // lights; the rest count as seen
+constexpr uint32_t kProbesPerNode = 8;
+constexpr size_t kMostNodes = 256;
 constexpr float kUnseenShare = 0.05f;  // a light that no probe saw keeps this share of its importance
+
+// A sphere around the texels' centres.
+LightTree::Place Around(std::span<const Texel> texels) {
+  LightTree::Place place;
+  for (const Texel& texel : texels) place.position += texel.position / static_cast<float>(texels.size());
+  for (const Texel& texel : texels) place.radius = std::max(place.radius, Length(texel.position - place.position));
+  return place;
+}
 
 }  // namespace
 
 TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, uint32_t key,
                        GatherCounters& counters)
-    : scene_(scene), visibility_(static_cast<size_t>(scene.lights.local_count()), 1.0f) {
-  if (scene.lights.local_count() < 2 || begin == end) return;
-  for (const int light : WorthProbing(map, begin, end)) {
-    int tried = 0, seen = 0;
-    for (uint32_t i = 0; i < kProbesPerLight; ++i) {
-      const Texel& texel = map.texels[begin + (end - begin) * (2 * i + 1) / (2 * kProbesPerLight)];
-      const uint32_t probe_key = HashCombine(HashCombine(key, static_cast<uint32_t>(light)), i);
-      const LightSample sample = scene.lights.SampleLocal(
-          light, texel.position, {UnitFloat(HashCombine(probe_key, 1)), UnitFloat(HashCombine(probe_key, 2))});
-      if (MaxComponent(sample.perpendicular) <= 0 || Dot(sample.dir, texel.normal) <= 0) continue;
-      SurfacePoint point = scene.world.PointAt(map.fragments[texel.fragment_begin].triangle, 0, 0, false);
-      point.position = texel.position;
-      point.normal = texel.normal;
-      ++tried;
-      ++counters.shadow_rays;
-      seen += scene.world.Occluded(ShadowRay(point, sample, probe_key)) ? 0 : 1;
+    : scene_(scene) {
+  if (scene.tree.empty() || begin == end) return;
+  const std::span<const Texel> texels = std::span(map.texels).subspan(begin, end - begin);
+  if (!scene.lights.emissive().empty()) cut_of_light_.resize(static_cast<size_t>(scene.lights.local_count()));
+  for (const int node : scene.tree.Cut(Around(texels), kMostNodes)) {
+    for (const int light : scene.tree.LightsOf(node)) {
+      if (!cut_of_light_.empty()) cut_of_light_[static_cast<size_t>(light)] = static_cast<int>(cut_.size());
     }
-    if (tried > 0) {
-      visibility_[light] = std::max(kUnseenShare, static_cast<float>(seen) / static_cast<float>(tried));
-    }
+    const float visibility = scene.lights.local_count() < 2 ? 1 : Probe(node, texels, map, key, counters);
+    cut_.push_back({node, visibility});
   }
 }
 
-std::vector<int> TileLights::WorthProbing(const TexelMap& map, uint32_t begin, uint32_t end) const {
-  std::vector<int> lights(visibility_.size());
-  std::iota(lights.begin(), lights.end(), 0);
-  if (lights.size() <= kMostProbed) return lights;
-  Vec3f center;
-  for (uint32_t i = begin; i < end; ++i) center += map.texels[i].position / static_cast<float>(end - begin);
-  float radius = 0;
-  for (uint32_t i = begin; i < end; ++i) radius = std::max(radius, Length(map.texels[i].position - center));
-  std::vector<float> importance;
-  for (const int light : lights) importance.push_back(scene_.lights.Importance(light, center, {}, radius));
-  std::nth_element(lights.begin(), lights.begin() + kMostProbed, lights.end(),
-                   [&](int a, int b) { return std::tuple(-importance[a], a) < std::tuple(-importance[b], b); });
-  lights.resize(kMostProbed);
-  return lights;
+float TileLights::Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
+                        GatherCounters& counters) const {
+  int tried = 0, seen = 0;
+  for (uint32_t i = 0; i < kProbesPerNode; ++i) {
+    const Texel& texel = texels[texels.size() * (2 * i + 1) / (2 * kProbesPerNode)];
+    const uint32_t first = static_cast<uint32_t>(scene_.tree.LightsOf(node)[0]);
+    const uint32_t probe_key = HashCombine(HashCombine(key, first), i);
+    SurfacePoint point = scene_.world.PointAt(map.fragments[texel.fragment_begin].triangle, 0, 0, false);
+    point.position = texel.position;
+    point.normal = texel.normal;
+    const LightTree::Pick pick =
+        scene_.tree.Draw(node, {point.position, point.normal}, UnitFloat(HashCombine(probe_key, 3)));
+    if (pick.light < 0) continue;
+    const LightSample sample = scene_.lights.SampleLocal(
+        pick.light, point.position, {UnitFloat(HashCombine(probe_key, 1)), UnitFloat(HashCombine(probe_key, 2))});
+    if (MaxComponent(sample.perpendicular) <= 0 || Dot(sample.dir, point.normal) <= 0) continue;
+    ++tried;
+    ++counters.shadow_rays;
+    seen += scene_.world.Occluded(ShadowRay(point, sample, probe_key)) ? 0 : 1;
+  }
+  return tried > 0 ? std::max(kUnseenShare, static_cast<float>(seen) / static_cast<float>(tried)) : 1.0f;
 }
 
 TileLights::Choice TileLights::ForTexel(const Texel& texel, float radius) const {
   Choice choice;
-  const int count = scene_.lights.local_count();
   std::vector<float> weights;
-  for (int light = 0; light < count; ++light) {
-    const float importance =
-        scene_.lights.Importance(light, texel.position, texel.flat ? texel.normal : Vec3f{}, radius);
-    if (!(importance > 0)) continue;
-    choice.light.push_back(light);
-    weights.push_back(importance * visibility_[light]);
+  const LightTree::Place place{texel.position, texel.flat ? texel.normal : Vec3f{}, radius};
+  for (const Node& node : cut_) {
+    weights.push_back(scene_.tree.Importance(node.node, place) * node.visibility);
+    choice.empty = choice.empty && !(weights.back() > 0);
   }
-  if (weights.empty()) return choice;
-  choice.distribution = Distribution1D(weights);
-  if (scene_.lights.emissive().empty()) return choice;
-  choice.probability_of_light.assign(static_cast<size_t>(count), 0.0f);
-  for (size_t i = 0; i < choice.light.size(); ++i) {
-    choice.probability_of_light[choice.light[i]] = choice.distribution.Probability(static_cast<int>(i));
-  }
+  if (!choice.empty) choice.distribution = Distribution1D(weights);
   return choice;
+}
+
+LightTree::Pick TileLights::Draw(const Choice& choice, const SurfacePoint& point, float u) const {
+  const auto drawn = choice.distribution.Draw(u);
+  LightTree::Pick pick =
+      scene_.tree.Draw(cut_[static_cast<size_t>(drawn.index)].node, {point.position, point.normal}, drawn.remainder);
+  pick.probability *= drawn.probability;
+  return pick;
+}
+
+float TileLights::Probability(const Choice& choice, const SurfacePoint& point, int light) const {
+  if (choice.empty) return 0;
+  const int at = cut_of_light_[static_cast<size_t>(light)];
+  const float chosen = choice.distribution.Probability(at);
+  if (!(chosen > 0)) return 0;
+  return chosen * scene_.tree.Probability(cut_[static_cast<size_t>(at)].node, light, {point.position, point.normal});
 }
 
 namespace {
@@ -117,8 +127,9 @@ class DirectAdder {
 
 }  // namespace
 
-void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights::Choice& choice, uint32_t key,
-                  uint32_t begin, uint32_t end, Accumulator& sum, GatherCounters& counters) {
+void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights& lights,
+                  const TileLights::Choice& choice, uint32_t key, uint32_t begin, uint32_t end, Accumulator& sum,
+                  GatherCounters& counters) {
   const SobolSet set(HashCombine(key, 0xd12ec7u)), far_set(HashCombine(key, 0xfa25e7u));
   const EnvironmentLight& sky = scene.lights.environment();
   const bool sky_sampled = sky.bright() && !sky.smooth();
@@ -129,10 +140,12 @@ void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const T
     if (!point.valid) continue;
     sum.Count();
     const uint32_t ray_key = HashCombine(key, i);
-    if (!choice.empty()) {
-      const auto drawn = choice.distribution.Draw(u.Get(2));
-      const int light = choice.light[drawn.index];
-      adder.Add(point, scene.lights.SampleLocal(light, point.surface.position, u.Get2(3)), drawn.probability, ray_key);
+    if (!choice.empty) {
+      const LightTree::Pick pick = lights.Draw(choice, point.surface, u.Get(2));
+      if (pick.light >= 0) {
+        adder.Add(point, scene.lights.SampleLocal(pick.light, point.surface.position, u.Get2(3)), pick.probability,
+                  ray_key);
+      }
     }
     const SobolPoint far = far_set.At(i);
     const TexelPoint under_sun = scene.lights.directionals().empty() ? point : sampler.AtMirrored(u.Get2(0));

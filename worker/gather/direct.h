@@ -8,35 +8,45 @@
 
 namespace bakewell {
 
-// Chooses among local lights for the texels of one tile: by each light's unoccluded irradiance at the texel, times how
-// much of it a few probes from the tile's texels saw (never zero for a light that can reach the texel, so that the
-// choice stays unbiased).
+// Chooses among local lights for the texels of one tile. Where there are few, each is a choice of its own; of many,
+// those that matter to the tile, the others in groups (a cut through the light tree). The chance of each is its
+// unoccluded irradiance at the texel, times how much of it a few probes from the tile's texels saw (never zero for a
+// light that can reach the texel, so that the choice stays unbiased); inside a group the tree goes on.
 class TileLights {
  public:
   TileLights(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, uint32_t key,
              GatherCounters& counters);
 
-  // The distribution for one texel. Empty where no local light can reach it.
+  // The distribution for one texel over the nodes of the tile's cut. Empty where no local light can reach it.
   struct Choice {
-    std::vector<int> light;  // lights with a chance
     Distribution1D distribution;
-    std::vector<float> probability_of_light;  // per local light, for multiple importance sampling
-    bool empty() const { return light.empty(); }
+    bool empty = true;
   };
   Choice ForTexel(const Texel& texel, float radius) const;
 
+  // One light for a point of the texel.
+  LightTree::Pick Draw(const Choice& choice, const SurfacePoint& point, float u) const;
+  float Probability(const Choice& choice, const SurfacePoint& point, int light) const;
+
  private:
-  // The lights that matter most to the tile, at most 256.
-  std::vector<int> WorthProbing(const TexelMap& map, uint32_t begin, uint32_t end) const;
+  struct Node {
+    int node = 0;          // of the tree
+    float visibility = 1;  // (0, 1]
+  };
+  // Share of a few probes from the tile's texels that see the node; 1 where none could tell.
+  float Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
+              GatherCounters& counters) const;
 
   const GatherScene& scene_;
-  std::vector<float> visibility_;  // per local light, (0, 1]
+  std::vector<Node> cut_;          // at most kMostNodes
+  std::vector<int> cut_of_light_;  // per local light, where anything emits that rays can meet
 };
 
 // Direct light of one texel from explicitly sampled lights: the local lights (one sample of one light each), every
 // directional light, the sky where it is not smooth. Samples are points [begin, end) of a Sobol set, of `planned` in
 // all.
-void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights::Choice& choice, uint32_t key,
-                  uint32_t begin, uint32_t end, Accumulator& sum, GatherCounters& counters);
+void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights& lights,
+                  const TileLights::Choice& choice, uint32_t key, uint32_t begin, uint32_t end, Accumulator& sum,
+                  GatherCounters& counters);
 
 }  // namespace bakewell

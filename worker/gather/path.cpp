@@ -28,7 +28,8 @@ Rgb FoundLight(const GatherScene& scene, const SurfacePoint& from, Vec3f dir, co
   if (light < 0) return {};
   const Rgb emission = scene.world.EmissionAt(hit);
   if (MaxComponent(emission) <= 0) return {};
-  const float light_pdf = scene.selector.Probability(light) * scene.lights.PdfLocal(light, from.position, dir, hit.t);
+  const float light_pdf = scene.tree.Probability(LightTree::kRoot, light, {from.position, from.normal}) *
+                          scene.lights.PdfLocal(light, from.position, dir, hit.t);
   return emission * PowerHeuristic(pdf, light_pdf);
 }
 
@@ -47,10 +48,12 @@ Rgb Arriving(const GatherScene& scene, const SurfacePoint& point, const LightSam
 
 Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters) {
   Rgb irradiance;
-  if (!scene.selector.empty()) {
-    const LightSelector::Choice choice = scene.selector.Pick(Random(key, 1));
-    const LightSample sample = scene.lights.SampleLocal(choice.light, point.position, {Random(key, 2), Random(key, 3)});
-    irradiance += Arriving(scene, point, sample, choice.probability, key, counters);
+  if (!scene.tree.empty()) {
+    const LightTree::Pick pick = scene.tree.Draw(LightTree::kRoot, {point.position, point.normal}, Random(key, 1));
+    if (pick.light >= 0) {
+      const LightSample sample = scene.lights.SampleLocal(pick.light, point.position, {Random(key, 2), Random(key, 3)});
+      irradiance += Arriving(scene, point, sample, pick.probability, key, counters);
+    }
   }
   for (size_t i = 0; i < scene.lights.directionals().size(); ++i) {
     const uint32_t k = static_cast<uint32_t>(2 * i);

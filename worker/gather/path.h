@@ -1,6 +1,6 @@
 #pragma once
 
-#include "worker/light/select.h"
+#include "worker/light/tree.h"
 #include "worker/photon/cache.h"
 
 namespace bakewell {
@@ -9,7 +9,7 @@ namespace bakewell {
 struct GatherScene {
   const World& world;
   const LightSet& lights;
-  const LightSelector& selector;
+  const LightTree& tree;
   const SurfaceCells& cells;
   const RadianceCache& cache;
 };

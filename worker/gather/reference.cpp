@@ -44,7 +44,7 @@ class PathNumbers {
 
 class PathTracer {
  public:
-  PathTracer(const World& world, const LightSet& lights) : world_(world), lights_(lights), selector_(lights) {}
+  PathTracer(const World& world, const LightSet& lights) : world_(world), lights_(lights), tree_(lights) {}
 
   // Irradiance estimate of one path that starts at `point`; dimensions 0..1 of bounce 0 belong to the caller.
   // Directional lights shine on `under_sun` (TexelSampler::AtMirrored) at the first surface.
@@ -71,10 +71,12 @@ class PathTracer {
  private:
   Rgb Direct(const SurfacePoint& point, const SurfacePoint& under_sun, const PathNumbers& numbers, int bounce) {
     Rgb irradiance;
-    if (!selector_.empty()) {
-      const auto choice = selector_.Pick(numbers.Get(bounce, 4));
-      irradiance += Arriving(point, lights_.SampleLocal(choice.light, point.position, numbers.Get2(bounce, 5)),
-                             choice.probability, numbers.RayKey(bounce));
+    if (!tree_.empty()) {
+      const auto pick = tree_.Draw(LightTree::kRoot, {point.position, point.normal}, numbers.Get(bounce, 4));
+      if (pick.light >= 0) {
+        irradiance += Arriving(point, lights_.SampleLocal(pick.light, point.position, numbers.Get2(bounce, 5)),
+                               pick.probability, numbers.RayKey(bounce));
+      }
     }
     for (size_t i = 0; i < lights_.directionals().size(); ++i) {
       const uint32_t key = HashCombine(numbers.RayKey(bounce), static_cast<uint32_t>(i));
@@ -111,13 +113,14 @@ class PathTracer {
     if (light < 0) return {};
     const Rgb emission = world_.EmissionAt(hit);
     if (MaxComponent(emission) <= 0) return {};
-    const float other = selector_.Probability(light) * lights_.PdfLocal(light, point.position, dir, hit.t);
+    const float other = tree_.Probability(LightTree::kRoot, light, {point.position, point.normal}) *
+                        lights_.PdfLocal(light, point.position, dir, hit.t);
     return emission * (pdf / (pdf + other));
   }
 
   const World& world_;
   const LightSet& lights_;
-  const LightSelector selector_;
+  const LightTree tree_;
   int64_t rays_ = 0;
 };
 

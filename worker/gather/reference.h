@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/artifact/progress.h"
-#include "worker/light/select.h"
+#include "worker/light/tree.h"
 #include "worker/texel/texels.h"
 
 namespace bakewell {

@@ -17,8 +17,8 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
-Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Vec3f from, Vec3f dir, float pdf,
-                  const Hit& hit) {
+Rgb FoundByGather(const GatherScene& scene, const TileLights& lights, const TileLights::Choice& choice,
+                  const SurfacePoint& from, Vec3f dir, float pdf, const Hit& hit) {
   if (!hit) {
     const EnvironmentLight& sky = scene.lights.environment();
     if (!sky.bright()) return {};
@@ -28,8 +28,8 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights::Choice& choice, Ve
   if (light < 0) return {};
   const Rgb emission = scene.world.EmissionAt(hit);
   if (MaxComponent(emission) <= 0) return {};
-  const float chosen = choice.empty() ? 0 : choice.probability_of_light[light];
-  const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from, dir, hit.t) : 0;
+  const float chosen = lights.Probability(choice, from, light);
+  const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from.position, dir, hit.t) : 0;
   return emission * PowerHeuristic(pdf, light_pdf);
 }
 
@@ -85,7 +85,7 @@ class TileGatherer {
 
   bool NoExplicitLight(const Work& work) const {
     const EnvironmentLight& sky = scene_.lights.environment();
-    return work.choice.empty() && scene_.lights.directionals().empty() && (!sky.bright() || sky.smooth());
+    return work.choice.empty && scene_.lights.directionals().empty() && (!sky.bright() || sky.smooth());
   }
 
   // Samples [done, planned) of every active texel. False when none was active.
@@ -98,7 +98,7 @@ class TileGatherer {
   bool RoundOf(Work& work, uint32_t done, uint32_t planned) {
     if (work.direct_active) {
       if (done > 0) work.direct.Double();
-      GatherDirect(scene_, work.sampler, work.choice, work.key, done, planned, work.direct, counters_);
+      GatherDirect(scene_, work.sampler, *lights_, work.choice, work.key, done, planned, work.direct, counters_);
       work.direct_samples = static_cast<int>(planned);
     }
     if (work.indirect_active) {
@@ -140,7 +140,7 @@ class TileGatherer {
       ++counters_.gather_rays;
       const Hit hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, ray_key));
       work.backs += MeetsBack(scene_.world, hit) ? 1.0f : 0.0f;
-      Rgb radiance = FoundByGather(scene_, work.choice, point.surface.position, dir, pdf, hit);
+      Rgb radiance = FoundByGather(scene_, *lights_, work.choice, point.surface, dir, pdf, hit);
       if (hit) {
         const GatheredRadiance reflected = ReflectedRadiance(scene_, hit, ray_key, counters_);
         radiance += reflected.radiance;

@@ -161,8 +161,8 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
     made->mean_irradiance = MeanIrradiance(level->texels, stage->cells, made->cache);
     return made;
   }));
-  const LightSelector selector(*level->lights);
-  const GatherScene scene{*level->world, *level->lights, selector, stage->cells, photons->cache};
+  const LightTree tree(*level->lights);
+  const GatherScene scene{*level->world, *level->lights, tree, stage->cells, photons->cache};
   GatherOptions options = BudgetOf(work.settings, level->texels).gather;
   options.mean_irradiance = photons->mean_irradiance;
   GatheredTiles tiles;

@@ -9,7 +9,7 @@
 #include "core/artifact/settings.h"
 #include "core/base/fields.h"
 #include "worker/gather/tile.h"
-#include "worker/light/select.h"
+#include "worker/light/tree.h"
 
 namespace bakewell {
 

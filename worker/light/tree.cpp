@@ -1,0 +1,233 @@
+#include "worker/light/tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <queue>
+#include <tuple>
+
+namespace bakewell {
+namespace {
+
+constexpr float kSlackRad = 1e-3f;  // rounding of the angles below
+
+// What the tree asks of one light.
+struct LightShape {
+  Vec3f low, high;  // bounding box [m]
+  Vec3f axis;       // mean direction of emission
+  float cone_rad;   // half angle around it
+  float intensity;  // luminance, along its brightest direction [W sr^-1]
+};
+
+LightShape ShapeOf(const LightSet& lights, int light) {
+  if (!lights.IsEmissive(light)) {
+    const PunctualLight& punctual = lights.locals()[static_cast<size_t>(light)];
+    const bool spot = punctual.type == LightType::kSpot;
+    return {punctual.position, punctual.position, spot ? punctual.direction : Vec3f{0, 0, 1},
+            spot ? std::acos(std::clamp(punctual.cos_outer, -1.0f, 1.0f)) : kPiF, Luminance(punctual.intensity)};
+  }
+  const EmissiveTriangle& emissive = lights.emissive()[static_cast<size_t>(light) - lights.locals().size()];
+  const Triangle& t = lights.world().triangles()[emissive.triangle];
+  LightShape shape{t.p0, t.p0, t.normal, emissive.two_sided ? kPiF : kPiF / 2,
+                   Luminance(emissive.mean_radiance) * emissive.area};
+  for (const Vec3f p : {t.p0 + t.e1, t.p0 + t.e2}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      shape.low[axis] = std::min(shape.low[axis], p[axis]);
+      shape.high[axis] = std::max(shape.high[axis], p[axis]);
+    }
+  }
+  return shape;
+}
+
+float AngleBetween(Vec3f a, Vec3f b) { return std::acos(std::clamp(Dot(a, b), -1.0f, 1.0f)); }
+
+// The smallest cone around two cones (axis, half angle).
+std::pair<Vec3f, float> Join(Vec3f a, float a_rad, Vec3f b, float b_rad) {
+  if (a_rad < b_rad) return Join(b, b_rad, a, a_rad);
+  const float between = AngleBetween(a, b);
+  if (between + b_rad <= a_rad) return {a, a_rad};
+  const float half = 0.5f * (a_rad + between + b_rad);
+  if (half >= kPiF) return {a, kPiF};
+  const Vec3f across = NormalizeOrZero(b - a * Dot(a, b));
+  if (Dot(across, across) < 0.5f) return {a, kPiF};
+  const float turn = half - a_rad;
+  return {NormalizeOrZero(a * std::cos(turn) + across * std::sin(turn)), half + kSlackRad};
+}
+
+}  // namespace
+
+LightTree::LightTree(const LightSet& lights) : set_(lights) {
+  const int count = lights.local_count();
+  if (count == 0) return;
+  lights_.resize(static_cast<size_t>(count));
+  std::iota(lights_.begin(), lights_.end(), 0);
+  leaf_of_light_.assign(static_cast<size_t>(count), -1);
+  nodes_.reserve(2 * static_cast<size_t>(count));
+  Build(0, count, -1);
+}
+
+int LightTree::Build(int begin, int end, int parent) {
+  const int at = static_cast<int>(nodes_.size());
+  nodes_.push_back({});
+  nodes_.back().begin = begin;
+  nodes_.back().end = end;
+  nodes_.back().parent = parent;
+  if (end - begin == 1) {
+    leaf_of_light_[static_cast<size_t>(lights_[static_cast<size_t>(begin)])] = at;
+  } else {
+    // Halves along the longest side of the box of the lights' centres.
+    std::vector<std::pair<Vec3f, int>> centers;
+    Vec3f low{1e30f, 1e30f, 1e30f}, high = -low;
+    for (int i = begin; i < end; ++i) {
+      const LightShape shape = ShapeOf(set_, lights_[static_cast<size_t>(i)]);
+      const Vec3f center = (shape.low + shape.high) * 0.5f;
+      centers.push_back({center, lights_[static_cast<size_t>(i)]});
+      for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], center[axis]);
+        high[axis] = std::max(high[axis], center[axis]);
+      }
+    }
+    const Vec3f extent = high - low;
+    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+    const auto middle = centers.begin() + (end - begin) / 2;
+    std::nth_element(centers.begin(), middle, centers.end(), [axis](const auto& a, const auto& b) {
+      return std::tuple(a.first[axis], a.second) < std::tuple(b.first[axis], b.second);
+    });
+    // In their halves by number, so that nothing depends on how nth_element works.
+    const auto by_number = [](const auto& a, const auto& b) { return a.second < b.second; };
+    std::sort(centers.begin(), middle, by_number);
+    std::sort(middle, centers.end(), by_number);
+    for (int i = begin; i < end; ++i) lights_[static_cast<size_t>(i)] = centers[static_cast<size_t>(i - begin)].second;
+    const int half = begin + (end - begin) / 2;
+    const int left = Build(begin, half, at), right = Build(half, end, at);
+    nodes_[static_cast<size_t>(at)].left = left;
+    nodes_[static_cast<size_t>(at)].right = right;
+  }
+  Enclose(nodes_[static_cast<size_t>(at)]);
+  return at;
+}
+
+void LightTree::Enclose(Node& node) const {
+  if (node.left < 0) {
+    const int light = lights_[static_cast<size_t>(node.begin)];
+    const LightShape shape = ShapeOf(set_, light);
+    node.center = (shape.low + shape.high) * 0.5f;
+    node.radius = 0.5f * Length(shape.high - shape.low);
+    node.axis = shape.axis;
+    node.cone_rad = shape.cone_rad + kSlackRad;
+    node.intensity = shape.intensity;
+    return;
+  }
+  const Node &a = nodes_[static_cast<size_t>(node.left)], &b = nodes_[static_cast<size_t>(node.right)];
+  const float distance = Length(b.center - a.center);
+  if (a.radius >= distance + b.radius || b.radius >= distance + a.radius) {
+    const Node& larger = a.radius >= b.radius ? a : b;
+    node.center = larger.center;
+    node.radius = larger.radius;
+  } else {
+    node.radius = 0.5f * (distance + a.radius + b.radius);
+    node.center = a.center + (b.center - a.center) * ((node.radius - a.radius) / distance);
+  }
+  node.radius *= 1.0001f;
+  std::tie(node.axis, node.cone_rad) = Join(a.axis, a.cone_rad, b.axis, b.cone_rad);
+  node.intensity = a.intensity + b.intensity;
+}
+
+float LightTree::Importance(int node, const Place& place) const {
+  const Node& n = nodes_[static_cast<size_t>(node)];
+  if (n.left < 0) {
+    return set_.Importance(lights_[static_cast<size_t>(n.begin)], place.position, place.normal, place.radius);
+  }
+  const Vec3f to_light = n.center - place.position;
+  const float reach = n.radius + place.radius, distance = Length(to_light);
+  const float distance2 = std::max(distance * distance, 0.25f * reach * reach);
+  if (distance <= reach || !(distance > 0)) return n.intensity / std::max(distance2, 1e-30f);
+  const Vec3f dir = to_light / distance;
+  // Directions to the lights lie within this angle of `dir`.
+  const float spread = std::asin(std::min(1.0f, reach / distance)) + kSlackRad;
+  float cosine = 1;
+  if (Dot(place.normal, place.normal) > 0.5f) {
+    const float angle = AngleBetween(place.normal, dir) - spread;
+    if (angle >= kPiF / 2) return 0;
+    cosine = std::max(0.01f, std::cos(std::max(0.0f, angle)));
+  }
+  const float beyond = AngleBetween(n.axis, -dir) - spread;
+  if (beyond >= n.cone_rad) return 0;
+  return n.intensity * cosine / distance2;
+}
+
+LightTree::Pick LightTree::Draw(int node, const Place& place, float u) const {
+  Pick pick;
+  double probability = 1, rest = static_cast<double>(u);
+  while (!IsLeaf(node)) {
+    const Node& n = nodes_[static_cast<size_t>(node)];
+    const double left = static_cast<double>(Importance(n.left, place));
+    const double right = static_cast<double>(Importance(n.right, place));
+    if (!(left + right > 0)) return pick;
+    const double share = left / (left + right);
+    if (rest < share) {
+      rest /= share;
+      probability *= share;
+      node = n.left;
+    } else {
+      if (!(share < 1)) return pick;
+      rest = std::min((rest - share) / (1 - share), 1 - 0x1p-53);
+      probability *= 1 - share;
+      node = n.right;
+    }
+  }
+  pick.light = lights_[static_cast<size_t>(nodes_[static_cast<size_t>(node)].begin)];
+  pick.probability = static_cast<float>(probability);
+  return pick;
+}
+
+float LightTree::Probability(int node, int light, const Place& place) const {
+  double probability = 1;
+  int at = leaf_of_light_[static_cast<size_t>(light)];
+  while (at != node) {
+    const int parent = nodes_[static_cast<size_t>(at)].parent;
+    if (parent < 0) return 0;
+    const Node& n = nodes_[static_cast<size_t>(parent)];
+    const double left = static_cast<double>(Importance(n.left, place));
+    const double right = static_cast<double>(Importance(n.right, place));
+    if (!(left + right > 0)) return 0;
+    const double share = left / (left + right);
+    probability *= at == n.left ? share : 1 - share;
+    at = parent;
+  }
+  return static_cast<float>(probability);
+}
+
+std::span<const int> LightTree::LightsOf(int node) const {
+  const Node& n = nodes_[static_cast<size_t>(node)];
+  return std::span(lights_).subspan(static_cast<size_t>(n.begin), static_cast<size_t>(n.end - n.begin));
+}
+
+std::vector<int> LightTree::Cut(const Place& place, size_t most) const {
+  std::vector<int> cut;
+  if (empty()) return cut;
+  using Candidate = std::pair<float, int>;
+  const auto weaker = [](const Candidate& a, const Candidate& b) {
+    return std::tuple(a.first, -a.second) < std::tuple(b.first, -b.second);
+  };
+  std::priority_queue<Candidate, std::vector<Candidate>, decltype(weaker)> open(weaker);
+  const auto add = [&](int node) {
+    if (IsLeaf(node)) {
+      cut.push_back(node);
+    } else {
+      open.push({Importance(node, place), node});
+    }
+  };
+  add(kRoot);
+  while (!open.empty() && cut.size() + open.size() < most) {
+    const Node& n = nodes_[static_cast<size_t>(open.top().second)];
+    open.pop();
+    add(n.left);
+    add(n.right);
+  }
+  for (; !open.empty(); open.pop()) cut.push_back(open.top().second);
+  std::sort(cut.begin(), cut.end(), [this](int a, int b) { return LightsOf(a)[0] < LightsOf(b)[0]; });
+  return cut;
+}
+
+}  // namespace bakewell

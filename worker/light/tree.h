@@ -1,0 +1,64 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "worker/light/lights.h"
+
+namespace bakewell {
+
+// A binary tree over the local lights, to choose one of them for a point in a time that grows with the logarithm of
+// their number (Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting"). A leaf
+// is one light. A node knows its lights' bounding sphere, intensity, and a cone that holds the directions they emit to.
+class LightTree {
+ public:
+  explicit LightTree(const LightSet& lights);
+
+  bool empty() const { return nodes_.empty(); }
+  static constexpr int kRoot = 0;
+
+  // A place that wants light: the points within `radius` of `position` on a plane with unit `normal` (zero: any).
+  struct Place {
+    Vec3f position, normal;
+    float radius = 0;
+  };
+
+  // About the unoccluded irradiance (luminance) that a node brings to a place, exactly 0 only where it brings none.
+  float Importance(int node, const Place& place) const;
+
+  struct Pick {
+    int light = -1;         // -1: none of the node's lights reaches the place
+    float probability = 0;  // of the light, given the node
+  };
+  // One light of a node; u in [0, 1).
+  Pick Draw(int node, const Place& place, float u) const;
+  // With which probability Draw gives a light of the node.
+  float Probability(int node, int light, const Place& place) const;
+
+  // Nodes that hold every light once, at most `most` of them, split where their light at the place is strongest; by the
+  // first light that they hold.
+  std::vector<int> Cut(const Place& place, size_t most) const;
+  // All lights of a node.
+  std::span<const int> LightsOf(int node) const;
+  bool IsLeaf(int node) const { return nodes_[static_cast<size_t>(node)].left < 0; }
+
+ private:
+  struct Node {
+    Vec3f center;
+    float radius = 0;     // of the sphere around the lights [m]
+    Vec3f axis{0, 0, 1};  // of the cone of emission
+    float cone_rad = 0;   // its half angle, falloff included; pi: to everywhere
+    float intensity = 0;  // luminance, of all together along their brightest directions [W sr^-1]
+    int left = -1, right = -1, parent = -1;
+    int begin = 0, end = 0;  // lights_[begin, end)
+  };
+  int Build(int begin, int end, int parent);
+  void Enclose(Node& node) const;
+
+  const LightSet& set_;
+  std::vector<int> lights_;         // light numbers, so that every node's are consecutive
+  std::vector<int> leaf_of_light_;  // node
+  std::vector<Node> nodes_;
+};
+
+}  // namespace bakewell
