@@ -8,10 +8,10 @@ namespace bakewell {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr float kLift = 0.05f;        // height of the rays between neighbours, over their length
-constexpr float kSameFacing = 0.9f;   // least cosine between the normals of neighbours
-constexpr double kConfidence = 0.85;  // half width of a confidence interval, in standard errors
-constexpr double kRidge = 1e-3;       // holds slopes back, so that texels in one line or one corner give an answer too
+constexpr float kLift = 0.05f;       // height of the rays between neighbours, over their length
+constexpr float kSameFacing = 0.9f;  // least cosine between the normals of neighbours
+constexpr double kConfidence = 0.5;  // half width of a confidence interval, in standard errors
+constexpr double kRidge = 1e-3;      // holds slopes back, so that texels in one line or one corner give an answer too
 
 // Sums over a window's texels for a first-order regression over their offsets x, y [texels].
 struct Moments {

@@ -72,9 +72,9 @@ class Page {
 
 TEST(SmoothGrid, ASlopeIsKeptAndItsNoiseGoes) {
   const auto slope = [](int x, int y) { return 3 + 0.2f * static_cast<float>(x) - 0.1f * static_cast<float>(y); };
-  // A window of radius 7 has 225 texels: a factor of 15 at best, less at the page's border.
-  EXPECT_LT(Page(slope, 0.5f, 1).ErrorRatio(), 0.2);
-  EXPECT_LT(Page(slope, 0.01f, 1).ErrorRatio(), 0.2);
+  // Intervals of half a standard error settle for windows of a dozen texels on the whole.
+  EXPECT_LT(Page(slope, 0.5f, 1).ErrorRatio(), 0.4);
+  EXPECT_LT(Page(slope, 0.01f, 1).ErrorRatio(), 0.4);
 }
 
 TEST(SmoothGrid, AnEdgeThatNoiseDoesNotHideStays) {
