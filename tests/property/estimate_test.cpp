@@ -58,8 +58,9 @@ Scene SmallRoom() {
   return builder.Build();
 }
 
-std::vector<double> LuminancesWith(const Scene& scene, int samples) {
+std::vector<double> LuminancesWith(const Scene& scene, int samples, bool filter) {
   BakeSettings settings;
+  settings.filter = filter;
   settings.min_samples = settings.max_samples = samples;
   settings.photons = 100000;
   const BakedScene result = BakeSceneInMemory(scene, settings);
@@ -90,14 +91,21 @@ double Slope(const std::vector<double>& x, const std::vector<double>& y) {
 TEST(Convergence, ErrorFallsAtLeastWithTheRootOfTheSamples) {
   const Scene scene = SmallRoom();
   // 16 times the most samples: what it lacks itself changes the slope by less than 0.01.
-  const std::vector<double> limit = LuminancesWith(scene, 16384);
-  std::vector<double> log_samples, log_error;
+  const std::vector<double> limit = LuminancesWith(scene, 16384, false);
+  std::vector<double> log_samples, log_raw, log_filtered;
   for (int samples = 16; samples <= 1024; samples *= 2) {
     log_samples.push_back(std::log(samples));
-    log_error.push_back(std::log(Rms(LuminancesWith(scene, samples), limit)));
+    log_raw.push_back(std::log(Rms(LuminancesWith(scene, samples, false), limit)));
+    log_filtered.push_back(std::log(Rms(LuminancesWith(scene, samples, true), limit)));
+    EXPECT_LE(log_filtered.back(), log_raw.back()) << samples << " samples: the filter adds error";
   }
-  const double slope = Slope(log_samples, log_error);
-  EXPECT_LE(slope, -0.5) << "error " << std::exp(log_error.front()) << " to " << std::exp(log_error.back());
+  const double slope = Slope(log_samples, log_raw);
+  EXPECT_LE(slope, -0.5) << "error " << std::exp(log_raw.front()) << " to " << std::exp(log_raw.back());
+  // Filtered, the error begins lower; it must go on falling as fast where the filter has less and less to do.
+  const std::vector<double> last_samples(log_samples.end() - 4, log_samples.end());
+  const std::vector<double> last_errors(log_filtered.end() - 4, log_filtered.end());
+  const double last_slope = Slope(last_samples, last_errors);
+  EXPECT_LE(last_slope, -0.5) << "error " << std::exp(last_errors.front()) << " to " << std::exp(last_errors.back());
 }
 
 }  // namespace

@@ -11,6 +11,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr float kLift = 0.05f;       // height of the rays between neighbours, over their length
 constexpr float kSameFacing = 0.9f;  // least cosine between the normals of neighbours
 constexpr double kConfidence = 0.5;  // half width of a confidence interval, in standard errors
+constexpr float kMostOverOwn = 4;     // times a texel's own variance that its neighbours may make of it
+constexpr int kStrayRadius = 2;      // of the window whose strays say how large the noise is
+constexpr double kLeastStrays = 9;   // texels in it
 constexpr double kRidge = 1e-3;      // holds slopes back, so that texels in one line or one corner give an answer too
 
 // Sums over a window's texels for a first-order regression over their offsets x, y [texels].
@@ -103,6 +106,19 @@ class SmoothGrid::Growth {
   const Moments& known() const { return known_; }  // texels with a value
   const Moments& all() const { return all_; }
   double mean_variance() const { return variance_ / known_.n; }
+  // Mean square distance of the values from the plane that fits them best, without what the fit takes off.
+  double Stray() const {
+    const Moments& m = known_;
+    if (m.n < kLeastStrays) return kInfinity;
+    // Values are counted from their mean.
+    const double mean = value_ / m.n, vx = value_x_ - mean * m.x, vy = value_y_ - mean * m.y;
+    const double xx = m.xx - m.x * m.x / m.n, xy = m.xy - m.x * m.y / m.n, yy = m.yy - m.y * m.y / m.n;
+    const double det = xx * yy - xy * xy;
+    if (!(det > 1e-6 * xx * yy)) return kInfinity;
+    const double slope_x = (yy * vx - xy * vy) / det, slope_y = (xx * vy - xy * vx) / det;
+    const double square = square_ - value_ * mean - slope_x * vx - slope_y * vy;
+    return std::max(0.0, square) / (m.n - 3);
+  }
   bool Has(int dx, int dy) const { return inside_[Window::Index(dx, dy)]; }
 
   // The regression's value at the centre.
@@ -173,6 +189,7 @@ class SmoothGrid::Growth {
     known_.Add(dx, dy);
     const double value = static_cast<double>(cell.value);
     value_ += value;
+    square_ += value * value;
     value_x_ += value * dx;
     value_y_ += value * dy;
     variance_ += static_cast<double>(cell.variance);
@@ -182,16 +199,28 @@ class SmoothGrid::Growth {
   const int x_, y_;
   int radius_ = 0;
   Moments known_, all_;
-  double value_ = 0, value_x_ = 0, value_y_ = 0, variance_ = 0;
+  double value_ = 0, square_ = 0, value_x_ = 0, value_y_ = 0, variance_ = 0;
   std::array<bool, (2 * kMostRadius + 1) * (2 * kMostRadius + 1)> inside_{};
 };
 
+float SmoothGrid::NoiseVariance(int x, int y) const {
+  const float pooled = std::min(PooledVariance(x, y), kMostOverOwn * At(x, y).variance);
+  if (!(pooled > 0)) return pooled;
+  Growth window(*this, x, y);
+  while (window.radius() < kStrayRadius && window.Grow()) {
+  }
+  return std::min(pooled, static_cast<float>(window.Stray()));
+}
+
 float SmoothGrid::Choose(int x, int y, Steps* steps) const {
   Growth window(*this, x, y);
-  double low = -kInfinity, high = kInfinity, overlap = 0;
+  double low = -kInfinity, high = kInfinity, overlap = 0, variance = kInfinity;
   for (int radius = 0;; ++radius) {
     const Weights weights(window.known());
-    const double estimate = window.Estimate(weights), reach = kConfidence * std::sqrt(window.Variance(weights));
+    const double estimate = window.Estimate(weights);
+    // A window that takes in noisier texels must not widen its interval: quiet texels keep away from them.
+    variance = std::min(variance, window.Variance(weights));
+    const double reach = kConfidence * std::sqrt(variance);
     if (steps != nullptr) (*steps)[static_cast<size_t>(radius)] = window.Result(weights, estimate);
     low = std::max(low, estimate - reach);
     high = std::min(high, estimate + reach);

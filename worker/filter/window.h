@@ -47,8 +47,11 @@ class SmoothGrid {
   // Connects (x, y) with its neighbour in direction k, if that lies on the grid.
   void Connect(int x, int y, int k);
 
-  // Mean variance of a known texel and its connected neighbours: eight blocks alone say little.
-  float PooledVariance(int x, int y) const;
+  // The variance of a known texel as it and its neighbourhood say together: the mean over it and its connected
+  // neighbours (eight blocks alone say little), or what the texels within two stray from a plane, if that is less.
+  // Blocks of one Sobol set overstate the error of the whole; texels' sets are independent, so that their strays do
+  // not.
+  float NoiseVariance(int x, int y) const;
 
   // The estimate of a window, and the variance that it will have once texels that are not known yet are as well known
   // as the others.
@@ -84,6 +87,7 @@ class SmoothGrid {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
   class Growth;
+  float PooledVariance(int x, int y) const;
   void AddWeights(const Growth& growth, int x, int y, float share, Window& window) const;
 
   int width_, height_;

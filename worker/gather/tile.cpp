@@ -228,7 +228,7 @@ class TileGatherer {
       cell.value = Luminance(work_[i].indirect.Irradiance());
       cell.variance = Luminance(work_[i].indirect.Variance());
     }
-    ForEachCell([&](size_t i, int x, int y) { result[i].variance = grid_.PooledVariance(x, y); });
+    ForEachCell([&](size_t i, int x, int y) { result[i].variance = grid_.NoiseVariance(x, y); });
     ForEachCell([&](size_t i, int, int) { CellOf(i).variance = result[i].variance; });
     std::vector<SmoothGrid::Steps> steps(work_.size());
     ForEachCell([&](size_t i, int x, int y) { CellOf(i).radius = grid_.Choose(x, y, &steps[i]); });

@@ -9,11 +9,14 @@
 namespace bakewell {
 namespace {
 
-constexpr float kSlackRad = 1e-3f;  // rounding of the angles below
+constexpr float kSlackRad = 1e-3f;         // rounding of the angles below
+constexpr float kClearlyFarther = 1.001f;  // more than rounding makes of equal distances
+constexpr float kSplitSteps = 1000;        // places told apart along the line that lights are split along
 
 // What the tree asks of one light.
 struct LightShape {
-  Vec3f low, high;  // bounding box [m]
+  Vec3f center;  // of a sphere around it [m]
+  float radius;
   Vec3f axis;       // mean direction of emission
   float cone_rad;   // half angle around it
   float intensity;  // luminance, along its brightest direction [W sr^-1]
@@ -23,20 +26,30 @@ LightShape ShapeOf(const LightSet& lights, int light) {
   if (!lights.IsEmissive(light)) {
     const PunctualLight& punctual = lights.locals()[static_cast<size_t>(light)];
     const bool spot = punctual.type == LightType::kSpot;
-    return {punctual.position, punctual.position, spot ? punctual.direction : Vec3f{0, 0, 1},
+    return {punctual.position, 0, spot ? punctual.direction : Vec3f{0, 0, 1},
             spot ? std::acos(std::clamp(punctual.cos_outer, -1.0f, 1.0f)) : kPiF, Luminance(punctual.intensity)};
   }
   const EmissiveTriangle& emissive = lights.emissive()[static_cast<size_t>(light) - lights.locals().size()];
   const Triangle& t = lights.world().triangles()[emissive.triangle];
-  LightShape shape{t.p0, t.p0, t.normal, emissive.two_sided ? kPiF : kPiF / 2,
+  const Vec3f center = t.p0 + (t.e1 + t.e2) * (1.0f / 3);
+  LightShape shape{center, 0, t.normal, emissive.two_sided ? kPiF : kPiF / 2,
                    Luminance(emissive.mean_radiance) * emissive.area};
-  for (const Vec3f p : {t.p0 + t.e1, t.p0 + t.e2}) {
-    for (int axis = 0; axis < 3; ++axis) {
-      shape.low[axis] = std::min(shape.low[axis], p[axis]);
-      shape.high[axis] = std::max(shape.high[axis], p[axis]);
+  for (const Vec3f p : {t.p0, t.p0 + t.e1, t.p0 + t.e2}) shape.radius = std::max(shape.radius, Length(p - center));
+  return shape;
+}
+
+// Of equally far ones, but for rounding, the first.
+Vec3f FarthestFrom(Vec3f from, const std::vector<std::pair<Vec3f, int>>& points) {
+  float farthest = 0;
+  Vec3f result = from;
+  for (const auto& [point, light] : points) {
+    const float distance = Length(point - from);
+    if (distance > farthest * kClearlyFarther) {
+      farthest = distance;
+      result = point;
     }
   }
-  return shape;
+  return result;
 }
 
 float AngleBetween(Vec3f a, Vec3f b) { return std::acos(std::clamp(Dot(a, b), -1.0f, 1.0f)); }
@@ -75,29 +88,32 @@ int LightTree::Build(int begin, int end, int parent) {
   if (end - begin == 1) {
     leaf_of_light_[static_cast<size_t>(lights_[static_cast<size_t>(begin)])] = at;
   } else {
-    // Halves along the longest side of the box of the lights' centres.
+    // Halves along the line between two lights far from each other: no axis of the world's, so that a turned level has
+    // the same tree.
     std::vector<std::pair<Vec3f, int>> centers;
-    Vec3f low{1e30f, 1e30f, 1e30f}, high = -low;
     for (int i = begin; i < end; ++i) {
       const LightShape shape = ShapeOf(set_, lights_[static_cast<size_t>(i)]);
-      const Vec3f center = (shape.low + shape.high) * 0.5f;
-      centers.push_back({center, lights_[static_cast<size_t>(i)]});
-      for (int axis = 0; axis < 3; ++axis) {
-        low[axis] = std::min(low[axis], center[axis]);
-        high[axis] = std::max(high[axis], center[axis]);
-      }
+      centers.push_back({shape.center, lights_[static_cast<size_t>(i)]});
     }
-    const Vec3f extent = high - low;
-    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-    const auto middle = centers.begin() + (end - begin) / 2;
-    std::nth_element(centers.begin(), middle, centers.end(), [axis](const auto& a, const auto& b) {
-      return std::tuple(a.first[axis], a.second) < std::tuple(b.first[axis], b.second);
+    const Vec3f first = FarthestFrom(centers.front().first, centers);
+    const Vec3f line = FarthestFrom(first, centers) - first;
+    const float length2 = std::max(Dot(line, line), 1e-30f);
+    std::vector<std::tuple<int, int, Vec3f>> order;  // place along the line, number
+    for (const auto& [center, light] : centers) {
+      order.push_back(
+          {static_cast<int>(std::lround(kSplitSteps * Dot(center - first, line) / length2)), light, center});
+    }
+    const auto middle = order.begin() + (end - begin) / 2;
+    std::nth_element(order.begin(), middle, order.end(), [](const auto& x, const auto& y) {
+      return std::tie(std::get<0>(x), std::get<1>(x)) < std::tie(std::get<0>(y), std::get<1>(y));
     });
     // In their halves by number, so that nothing depends on how nth_element works.
-    const auto by_number = [](const auto& a, const auto& b) { return a.second < b.second; };
-    std::sort(centers.begin(), middle, by_number);
-    std::sort(middle, centers.end(), by_number);
-    for (int i = begin; i < end; ++i) lights_[static_cast<size_t>(i)] = centers[static_cast<size_t>(i - begin)].second;
+    const auto by_number = [](const auto& x, const auto& y) { return std::get<1>(x) < std::get<1>(y); };
+    std::sort(order.begin(), middle, by_number);
+    std::sort(middle, order.end(), by_number);
+    for (int i = begin; i < end; ++i) {
+      lights_[static_cast<size_t>(i)] = std::get<1>(order[static_cast<size_t>(i - begin)]);
+    }
     const int half = begin + (end - begin) / 2;
     const int left = Build(begin, half, at), right = Build(half, end, at);
     nodes_[static_cast<size_t>(at)].left = left;
@@ -111,8 +127,8 @@ void LightTree::Enclose(Node& node) const {
   if (node.left < 0) {
     const int light = lights_[static_cast<size_t>(node.begin)];
     const LightShape shape = ShapeOf(set_, light);
-    node.center = (shape.low + shape.high) * 0.5f;
-    node.radius = 0.5f * Length(shape.high - shape.low);
+    node.center = shape.center;
+    node.radius = shape.radius;
     node.axis = shape.axis;
     node.cone_rad = shape.cone_rad + kSlackRad;
     node.intensity = shape.intensity;
