@@ -193,7 +193,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
   const int page = static_cast<int>(work.range.begin);
   FilterCounters filtered;
   if (page >= static_cast<int>(level->texels.pages.size())) return absl::InvalidArgumentError("no such page");
-  if (work.settings.filter) FilterPage(level->texels, page, lights, filtered);
+  if (Filters(work.settings)) FilterPage(level->texels, page, lights, filtered);
   return PageFiles(level->texels, lights, page);
 }
 

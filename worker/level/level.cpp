@@ -23,7 +23,7 @@ QualityNumbers NumbersOf(Quality quality) {
     case Quality::kHigh:
       break;
   }
-  return {32, 4096, 96, 0.010f};
+  return {32, 4096, 64, 0.015f};
 }
 
 constexpr int64_t kLeastPhotons = 32768;
@@ -36,6 +36,8 @@ int64_t CellsFor(int64_t photons) {
   return std::max<int64_t>(1024, static_cast<int64_t>(4 * root * root));
 }
 
+bool Filters(const BakeSettings& settings) { return settings.filter && settings.quality != Quality::kHigh; }
+
 Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
   const QualityNumbers numbers = NumbersOf(settings.quality);
   Budget budget;
@@ -44,7 +46,7 @@ Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
   budget.gather.min_samples = std::min(budget.gather.min_samples, budget.gather.max_samples);
   budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
   budget.gather.seed = settings.seed;
-  budget.gather.filter = settings.filter;
+  budget.gather.filter = Filters(settings);
   const int64_t texel_count = static_cast<int64_t>(texels.texels.size());
   budget.photons =
       settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texel_count * numbers.photons_per_texel);

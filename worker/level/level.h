@@ -18,6 +18,10 @@ struct Budget {
   GatherOptions gather;
   int64_t photons = 0;
 };
+// Whether indirect light is filtered: at high quality there is little noise that a filter could take for nothing
+// (worker/filter/README.md).
+bool Filters(const BakeSettings& settings);
+
 Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels);
 
 // A scene with its charts, ready to be traced. Immutable; made once and shared by the tasks that need it.
