@@ -1,5 +1,6 @@
 #include "client/cli/cli.h"
 
+#include "client/cli/admin_command.h"
 #include "client/cli/commands.h"
 #include "client/cli/farm_commands.h"
 #include "client/cli/interrupt.h"
@@ -56,6 +57,7 @@ int RunCli(int argc, const char* const* argv, const Console& console, const Bake
   AddCompareCommand(app, console, &exit_code);
   AddUnwrapCommand(app, console, bakers, &exit_code);
   AddFarmCommands(app, console, &exit_code);
+  AddAdminCommand(app, console, &exit_code);
   if (argc > 1 && argv[1][0] != '-' && !HasCommand(app, argv[1])) {
     console.err << "bakewell: there is no command " << argv[1] << "; bakewell --help lists them" << std::endl;
     return kExitUserError;

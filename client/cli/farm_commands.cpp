@@ -2,19 +2,15 @@
 
 #include <absl/strings/str_format.h>
 
-#include <fstream>
-#include <iterator>
 #include <memory>
 
 #include "client/cli/bake_flags.h"
 #include "client/cli/commands.h"
-#include "client/gltf/level.h"
+#include "client/cli/farm_flags.h"
+#include "client/job/result.h"
+#include "client/job/submission.h"
 #include "client/rpc/farm_client.h"
 #include "core/artifact/json_line.h"
-#include "core/atlas/serialize.h"
-#include "core/scene/canonical.h"
-#include "proto/bakewell/v1/settings.pb.h"
-#include "proto/settings.h"
 
 namespace bakewell {
 
@@ -24,8 +20,7 @@ namespace fs = std::filesystem;
 
 // What every one of the commands has.
 struct FarmFlags {
-  ConnectOptions connect;
-  std::string token_file;
+  ConnectFlags connect;
   bool json = false;
   BakeFlags bake;
   int64_t job = 0;
@@ -34,37 +29,13 @@ struct FarmFlags {
   int limit = 20;
 };
 
-constexpr char kLayoutFile[] = "atlas-layout.bin";
-
-absl::StatusOr<std::unique_ptr<FarmClient>> Open(FarmFlags& flags) {
-  if (!flags.token_file.empty()) {
-    std::ifstream file(flags.token_file);
-    if (!(file >> flags.connect.token)) return absl::InvalidArgumentError("cannot read a token in " + flags.token_file);
-  } else if (const char* token = std::getenv("BAKEWELL_TOKEN")) {
-    flags.connect.token = token;
-  }
-  BAKEWELL_ASSIGN_OR_RETURN(auto connection, Connection::Open(flags.connect));
-  return std::make_unique<FarmClient>(std::move(connection));
+absl::StatusOr<Submission> Prepare(const FarmFlags& flags) {
+  BAKEWELL_ASSIGN_OR_RETURN(const BakeSettings settings, SettingsFromFlags(flags.bake));
+  return MakeSubmission(flags.bake.scene, settings);
 }
 
-// A scene as it is submitted: the environment of the settings moves into it.
-struct Submission {
-  LoadedLevel level;
-  std::string scene;
-  SubmitOptions options;
-};
-
-absl::StatusOr<Submission> Prepare(const FarmFlags& flags) {
-  Submission submission;
-  BAKEWELL_ASSIGN_OR_RETURN(BakeSettings settings, SettingsFromFlags(flags.bake));
-  BAKEWELL_ASSIGN_OR_RETURN(submission.level, LoadLevel(flags.bake.scene));
-  if (settings.environment) submission.level.scene.environment = *settings.environment;
-  settings.environment.reset();
-  const std::vector<std::byte> bytes = SerializeScene(submission.level.scene);
-  submission.scene.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  submission.options = {flags.client_key, flags.name, ProtoFromSettings(settings).SerializeAsString(),
-                        flags.interactive};
-  return submission;
+SubmitOptions OptionsOf(const FarmFlags& flags, const Submission& submission) {
+  return {flags.client_key, flags.name, submission.settings_bytes, flags.interactive};
 }
 
 std::string StateName(v1::JobState state) {
@@ -112,12 +83,6 @@ void PrintProgress(const v1::Job& job, const Console& console) {
               << std::flush;
 }
 
-absl::Status StatusOfEnded(const v1::Job& job) {
-  if (job.state() == v1::DONE) return absl::OkStatus();
-  if (job.state() == v1::CANCELLED) return absl::CancelledError("the job was cancelled");
-  return absl::AbortedError(absl::StrCat("job ", job.id(), " failed: ", job.reason()));
-}
-
 absl::StatusOr<v1::Job> WatchJob(FarmClient& client, int64_t id, const FarmFlags& flags, const Console& console) {
   const auto changed = [&](const v1::Job& job) {
     if (flags.json)
@@ -131,25 +96,13 @@ absl::StatusOr<v1::Job> WatchJob(FarmClient& client, int64_t id, const FarmFlags
   return job;
 }
 
-// scene.glb with the lightmaps' coordinates, as `bake` writes it.
-absl::Status WriteSceneFile(const FarmFlags& flags, const LoadedLevel& level) {
-  std::ifstream file(fs::path(flags.output) / kLayoutFile, std::ios::binary);
-  const std::string bytes(std::istreambuf_iterator<char>(file), {});
-  BAKEWELL_ASSIGN_OR_RETURN(const AtlasLayout layout, ParseLayout(bytes));
-  std::vector<LightmapFiles> pages;
-  for (size_t page = 0; page < layout.pages.size(); ++page) {
-    const std::string stem = absl::StrCat("lightmap-", page);
-    pages.push_back({stem + ".irradiance.exr", stem + ".sh.exr", stem + ".variance.exr"});
-  }
-  return WriteLevel(flags.bake.scene, level, layout, pages, fs::path(flags.output) / "scene.glb");
-}
-
 absl::Status Submit(FarmFlags& flags, const Console& console) {
   flags.output = flags.bake.output;
   BAKEWELL_ASSIGN_OR_RETURN(const Submission submission, Prepare(flags));
-  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
   for (const std::string& warning : submission.level.warnings) console.err << "warning: " << warning << "\n";
-  BAKEWELL_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted, client->Submit(submission.scene, submission.options));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
+                            client->Submit(submission.scene_bytes, OptionsOf(flags, submission)));
   if (!flags.wait) {
     BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client->Get(submitted.job_id()));
     PrintJob(job, flags, console);
@@ -157,15 +110,18 @@ absl::Status Submit(FarmFlags& flags, const Console& console) {
   }
   BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, WatchJob(*client, submitted.job_id(), flags, console));
   PrintJob(job, flags, console);
-  BAKEWELL_RETURN_IF_ERROR(StatusOfEnded(job));
-  BAKEWELL_RETURN_IF_ERROR(client->FetchAll(job, flags.output));
-  return WriteSceneFile(flags, submission.level);
+  BAKEWELL_RETURN_IF_ERROR(StatusOfEnded(job, flags.bake.scene));
+  BAKEWELL_ASSIGN_OR_RETURN(OutputDir out, OutputDir::Create(flags.output));
+  BAKEWELL_ASSIGN_OR_RETURN(Manifest manifest, FetchResult(*client, job, submission, out));
+  manifest.phases = PhasesOf(job);
+  return Conclude(out, flags.output, manifest).status();
 }
 
 absl::Status Estimate(FarmFlags& flags, const Console& console) {
   BAKEWELL_ASSIGN_OR_RETURN(const Submission submission, Prepare(flags));
-  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
-  BAKEWELL_ASSIGN_OR_RETURN(const v1::EstimateResponse cost, client->Estimate(submission.scene, submission.options));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::EstimateResponse cost,
+                            client->Estimate(submission.scene_bytes, OptionsOf(flags, submission)));
   const double low = static_cast<double>(cost.run_us_low()) * 1e-6,
                high = static_cast<double>(cost.run_us_high()) * 1e-6;
   if (flags.json) {
@@ -187,7 +143,7 @@ absl::Status Estimate(FarmFlags& flags, const Console& console) {
 }
 
 absl::Status List(FarmFlags& flags, const Console& console) {
-  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
   v1::ListRequest filter;
   filter.set_user(flags.user);
   BAKEWELL_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client->List(filter, flags.limit));
@@ -196,21 +152,21 @@ absl::Status List(FarmFlags& flags, const Console& console) {
 }
 
 absl::Status Watch(FarmFlags& flags, const Console& console) {
-  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
   BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, WatchJob(*client, flags.job, flags, console));
   PrintJob(job, flags, console);
-  return StatusOfEnded(job);
+  return StatusOfEnded(job, {});
 }
 
 absl::Status Cancel(FarmFlags& flags, const Console& console) {
-  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
   BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client->Cancel(flags.job));
   PrintJob(job, flags, console);
   return absl::OkStatus();
 }
 
 absl::Status Fetch(FarmFlags& flags, const Console& console) {
-  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
   BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client->Get(flags.job));
   BAKEWELL_RETURN_IF_ERROR(client->FetchAll(job, flags.output));
   for (const v1::Artifact& artifact : job.artifacts()) {
@@ -220,7 +176,7 @@ absl::Status Fetch(FarmFlags& flags, const Console& console) {
 }
 
 absl::Status Workers(FarmFlags& flags, const Console& console) {
-  BAKEWELL_ASSIGN_OR_RETURN(const auto client, Open(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
   BAKEWELL_ASSIGN_OR_RETURN(const v1::ListWorkersResponse response, client->Workers());
   for (const v1::WorkerState& worker : response.workers()) {
     if (flags.json) {
@@ -235,9 +191,9 @@ absl::Status Workers(FarmFlags& flags, const Console& console) {
                          .Text()
                   << "\n";
     } else {
-      console.out << absl::StrFormat("%-24s %3d cores  %3d leases  %6d done  %4d failed%s\n", worker.name(),
-                                     worker.cores(), worker.leases(), worker.tasks_done(), worker.tasks_failed(),
-                                     worker.draining() ? "  draining" : "");
+      console.out << absl::StrFormat("%12d  %-24s %3d cores  %3d leases  %6d done  %4d failed%s\n", worker.id(),
+                                     worker.name(), worker.cores(), worker.leases(), worker.tasks_done(),
+                                     worker.tasks_failed(), worker.draining() ? "  draining" : "");
     }
   }
   console.out << std::flush;
@@ -250,11 +206,7 @@ using Command = absl::Status (*)(FarmFlags&, const Console&);
 CLI::App* AddCommand(CLI::App& app, const char* name, const char* about, const std::shared_ptr<FarmFlags>& flags,
                      Command run, const Console& console, int* exit_code) {
   CLI::App* const command = app.add_subcommand(name, about);
-  command->add_option("--server", flags->connect.address, "the coordinator's HOST:PORT")->capture_default_str();
-  command->add_option("--ca", flags->connect.ca_file, "certificate authority (PEM): turns TLS on");
-  command->add_option("--cert", flags->connect.cert_file, "own certificate, for mutual TLS");
-  command->add_option("--key", flags->connect.key_file, "its private key");
-  command->add_option("--token-file", flags->token_file, "file with the token; else the environment's BAKEWELL_TOKEN");
+  AddConnectFlags(*command, flags->connect);
   command->callback([flags, run, &console, exit_code] {
     const bool json = flags->json || flags->bake.json;
     flags->json = json;

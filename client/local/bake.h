@@ -2,9 +2,8 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <string>
-#include <vector>
 
+#include "client/job/result.h"
 #include "core/artifact/progress.h"
 #include "core/artifact/settings.h"
 #include "core/base/status.h"
@@ -26,19 +25,13 @@ struct ReferenceRequest {
   int spp = 1024;  // paths a texel
 };
 
-// What a bake did; manifest.json has more.
-struct BakeSummary {
-  std::filesystem::path output_dir;
-  std::vector<std::filesystem::path> files;  // sorted; in output_dir
-  std::vector<std::string> warnings;         // what of the scene was ignored or repaired
-  double estimated_error = 0;                // relative standard error, root mean square over valid texels
-  double wall_seconds = 0, cpu_seconds = 0;
-  int64_t rays = 0;
-};
+// As many as asked for, 0: as the machine has.
+int ThreadCount(int threads);
 
-// Bakes one scene in this process. `progress` hears from any thread and is asked whether to stop.
-// kInvalidArgument, kNotFound: the scene or the output folder is at fault; kCancelled: as asked; kUnavailable,
-// kResourceExhausted: the disk. Unless it is OK, output_dir is as it was before.
+// Bakes one scene in this process, as a job of a farm of its own: the same planner, tasks and bytes. `progress` hears
+// from any thread and is asked whether to stop. kInvalidArgument, kNotFound: the scene or the output folder is at
+// fault; kCancelled: as asked; kUnavailable, kResourceExhausted: the disk. Unless it is OK, output_dir is as it was
+// before.
 absl::StatusOr<BakeSummary> Bake(const BakeRequest& request, Progress& progress);
 
 // The unbiased path tracer over the same texels, with its standard error per texel. Errors as Bake().

@@ -1,30 +1,9 @@
-#include <ctime>
-
-#include <chrono>
-
 #include "client/local/level_bake.h"
 #include "client/local/signal_density.h"
 #include "core/scene/canonical.h"
 #include "server/chart/choose.h"
 
 namespace bakewell {
-
-double PhaseClock::CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-double PhaseClock::WallSeconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-void PhaseClock::Begin(std::string phase) {
-  phases_.push_back({std::move(phase)});
-  wall_ = WallSeconds();
-  cpu_ = CpuSeconds();
-}
-
-void PhaseClock::End() {
-  phases_.back().wall_seconds = WallSeconds() - wall_;
-  phases_.back().cpu_seconds = CpuSeconds() - cpu_;
-}
 
 namespace {
 

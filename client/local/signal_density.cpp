@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/local/bake_texels.h"
 #include "server/chart/choose.h"
 
 namespace bakewell {

@@ -1,10 +1,10 @@
+#include "client/local/bake_texels.h"
+
 #include <tbb/parallel_for.h>
 
 #include <atomic>
 #include <mutex>
 
-#include "client/local/level_bake.h"
-#include "worker/finish/filter.h"
 #include "worker/trace/float_mode.h"
 
 namespace bakewell {

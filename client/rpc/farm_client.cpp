@@ -49,7 +49,7 @@ absl::StatusOr<Digest> DigestOfFile(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return absl::NotFoundError(path.string());
   Sha256 hash;
-  std::string block(1 << 20, '\0');
+  std::string block(64 << 10, '\0');
   while (file.read(block.data(), std::ssize(block)) || file.gcount() > 0) {
     hash.Update(std::as_bytes(std::span(block.data(), static_cast<size_t>(file.gcount()))));
   }
@@ -182,6 +182,11 @@ absl::Status FarmClient::WatchOnce(int64_t job, const std::function<bool(const v
   request.set_job_id(job);
   grpc::ClientContext context;
   connection_->PrepareStream(context);
+  {
+    const std::lock_guard lock(mutex_);
+    if (stopped_) return absl::CancelledError("not watched any more");
+    watching_.insert(&context);
+  }
   const auto reader = stubs_->bake->Watch(&context, request);
   v1::Job now;
   bool wanted = true;
@@ -191,9 +196,20 @@ absl::Status FarmClient::WatchOnce(int64_t job, const std::function<bool(const v
   }
   if (!wanted) context.TryCancel();
   const absl::Status status = FromGrpc(reader->Finish());
+  {
+    const std::lock_guard lock(mutex_);
+    watching_.erase(&context);
+    wanted = wanted && !stopped_;
+  }
   if (!wanted) return absl::CancelledError("not watched any more");
   if (status.ok() && !HasEnded(last)) return absl::UnavailableError("the coordinator went away");
   return status;
+}
+
+void FarmClient::StopWatching() {
+  const std::lock_guard lock(mutex_);
+  stopped_ = true;
+  for (grpc::ClientContext* context : watching_) context->TryCancel();
 }
 
 absl::StatusOr<v1::Job> FarmClient::Watch(int64_t job, const std::function<bool(const v1::Job&)>& changed) {
@@ -294,6 +310,27 @@ absl::Status FarmClient::DrainWorker(uint64_t worker, bool draining) {
     grpc::ClientContext context;
     connection_->Prepare(context, CallTime());
     return FromGrpc(stubs_->admin->Drain(&context, request, &response));
+  });
+}
+
+absl::Status FarmClient::SetPriority(int64_t job, int priority) {
+  v1::SetPriorityRequest request;
+  request.set_job_id(job);
+  request.set_priority(priority);
+  return Retry([&] {
+    v1::Job response;
+    grpc::ClientContext context;
+    connection_->Prepare(context, CallTime());
+    return FromGrpc(stubs_->admin->SetPriority(&context, request, &response));
+  });
+}
+
+absl::Status FarmClient::SetQuota(const v1::SetQuotaRequest& quota) {
+  return Retry([&] {
+    v1::SetQuotaResponse response;
+    grpc::ClientContext context;
+    connection_->Prepare(context, CallTime());
+    return FromGrpc(stubs_->admin->SetQuota(&context, quota, &response));
   });
 }
 

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +44,9 @@ class FarmClient {
   // false to stop watching: kCancelled.
   absl::StatusOr<v1::Job> Watch(int64_t job, const std::function<bool(const v1::Job&)>& changed);
 
+  // Ends every Watch() of this client, now and later, with kCancelled.
+  void StopWatching();
+
   // Writes an artifact to FOLDER/NAME, whole or not at all: to a ".part" file, which a later call resumes, verified,
   // synced and renamed. A file that is there and right is left alone. Names from the wire that are not plain paths are
   // refused (kDataLoss).
@@ -52,6 +57,8 @@ class FarmClient {
   absl::StatusOr<v1::ListWorkersResponse> Workers();
   absl::StatusOr<v1::StatusResponse> Status();
   absl::Status DrainWorker(uint64_t worker, bool draining);
+  absl::Status SetPriority(int64_t job, int priority);
+  absl::Status SetQuota(const v1::SetQuotaRequest& quota);
   absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(int64_t target_bytes, std::chrono::microseconds grace);
 
  private:
@@ -66,6 +73,9 @@ class FarmClient {
   const std::shared_ptr<Connection> connection_;
   const std::chrono::milliseconds patience_;
   const std::unique_ptr<Stubs> stubs_;
+  std::mutex mutex_;                         // guards what follows
+  std::set<grpc::ClientContext*> watching_;  // calls under way
+  bool stopped_ = false;
 };
 
 }  // namespace bakewell

@@ -40,6 +40,7 @@ std::string Serialize(const Survey& survey) {
   FieldWriter writer;
   writer.Put(survey.texels);
   writer.Put(survey.photons);
+  writer.Put(survey.overlapping_texels);
   PutAll(survey.texels_of_tile, writer);
   PutAll(survey.tile_end_of_page, writer);
   return std::move(writer).bytes();
@@ -50,10 +51,29 @@ absl::StatusOr<Survey> ParseSurvey(std::string_view bytes) {
   Survey survey;
   survey.texels = reader.Get<uint64_t>();
   survey.photons = reader.Get<uint64_t>();
+  survey.overlapping_texels = reader.Get<uint64_t>();
   survey.texels_of_tile = GetAll(reader);
   survey.tile_end_of_page = GetAll(reader);
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("texel survey"));
   return survey;
+}
+
+std::string Serialize(const PhotonCounts& counts) {
+  FieldWriter writer;
+  for (const int64_t count : {counts.photons, counts.photon_rays, counts.density_rays, counts.cells}) {
+    writer.Put(static_cast<uint64_t>(count));
+  }
+  return std::move(writer).bytes();
+}
+
+absl::StatusOr<PhotonCounts> ParsePhotonCounts(std::string_view bytes) {
+  FieldReader reader(bytes);
+  PhotonCounts counts;
+  for (int64_t* count : {&counts.photons, &counts.photon_rays, &counts.density_rays, &counts.cells}) {
+    *count = static_cast<int64_t>(reader.Get<uint64_t>());
+  }
+  BAKEWELL_RETURN_IF_ERROR(reader.Finish("photon counts"));
+  return counts;
 }
 
 }  // namespace bakewell::level_task

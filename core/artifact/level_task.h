@@ -14,22 +14,27 @@ namespace bakewell::level_task {
 //   chart/layout    scene                          -> layout
 //   texel/survey    scene layout                   -> survey
 //   photon/emit     scene layout                   -> flux         range: photon batch begin of end
-//   photon/density  scene layout flux0 flux1 ...   -> cache
+//   photon/density  scene layout flux0 flux1 ...   -> cache, totals
 //   gather/tiles    scene layout cache             -> lights       range: tiles [begin, end)
-//   finish/page     scene layout lights0 ...       -> the files of page begin
-//   finish/report   lights0 ...                    -> statistics.json
+//   finish/page     scene layout lights0 ...       -> the files of page begin, tally
+//   finish/report   survey totals tally0 ...       -> statistics.json (bake_report.h)
 // The version of a kind is raised whenever its bytes change for equal inputs.
 struct KindName {
   const char* kind;
   uint32_t code_version;
 };
 inline constexpr KindName kChart{"chart/layout", 2};
-inline constexpr KindName kSurvey{"texel/survey", 1};
+inline constexpr KindName kSurvey{"texel/survey", 2};
 inline constexpr KindName kEmit{"photon/emit", 2};
-inline constexpr KindName kDensity{"photon/density", 1};
+inline constexpr KindName kDensity{"photon/density", 2};
 inline constexpr KindName kGather{"gather/tiles", 2};
-inline constexpr KindName kFinish{"finish/page", 2};
-inline constexpr KindName kReport{"finish/report", 2};
+inline constexpr KindName kFinish{"finish/page", 3};
+inline constexpr KindName kReport{"finish/report", 3};
+inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};
+
+// The artifacts that are no files of the result: they say how to write scene.glb and the manifest.
+inline constexpr char kLayoutArtifact[] = "atlas-layout.bin";
+inline constexpr char kReportArtifact[] = "statistics.json";
 
 // TaskSpec::settings of all of them. `settings_json` is proto/settings.h SettingsJson() of the settings that the kind
 // looks at, the others being the defaults.
@@ -43,10 +48,18 @@ absl::StatusOr<Settings> ParseSettings(std::string_view bytes);
 // What the planner has to know about the texels of a layout.
 struct Survey {
   uint64_t texels = 0, photons = 0;
+  uint64_t overlapping_texels = 0;         // covered by more than one chart
   std::vector<uint32_t> texels_of_tile;    // tile_count
   std::vector<uint32_t> tile_end_of_page;  // one per page: its tiles end here, and begin where the page before ended
 };
 std::string Serialize(const Survey& survey);
 absl::StatusOr<Survey> ParseSurvey(std::string_view bytes);
+
+// What the photons' tasks counted.
+struct PhotonCounts {
+  int64_t photons = 0, photon_rays = 0, density_rays = 0, cells = 0;
+};
+std::string Serialize(const PhotonCounts& counts);
+absl::StatusOr<PhotonCounts> ParsePhotonCounts(std::string_view bytes);
 
 }  // namespace bakewell::level_task

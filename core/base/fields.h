@@ -17,7 +17,9 @@ class FieldWriter {
  public:
   template <std::unsigned_integral T>
   void Put(T value) {
-    for (size_t i = 0; i < sizeof(T); ++i) bytes_.push_back(static_cast<char>((value >> (8 * i)) & 0xff));
+    char bytes[sizeof(T)];
+    for (size_t i = 0; i < sizeof(T); ++i) bytes[i] = static_cast<char>((value >> (8 * i)) & 0xff);
+    bytes_.append(bytes, sizeof(T));
   }
   // 32-bit length, then the bytes.
   void PutString(std::string_view text);

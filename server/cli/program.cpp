@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <iostream>
@@ -58,8 +59,17 @@ void BlockSignals() {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 }
 
+// As many files as the system lets this process have: every connection is one.
+void RaiseFileLimit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 absl::Status Serve(const ServeFlags& flags, const plan::Planner& planner, const job::LocalTasks& local) {
   BlockSignals();
+  RaiseFileLimit();
   spdlog::set_default_logger(spdlog::stderr_color_mt("bakewell-server"));
   job::Options options;
   options.folder = flags.data;

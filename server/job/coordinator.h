@@ -99,7 +99,7 @@ class Coordinator {
   absl::Status RecoverJob(const store::JobRow& row);
   JobView ViewOf(const Job& job) const;
   TaskOutputs ArtifactsOf(const Job& job) const;
-  void EndJob(int64_t id, store::JobState state, const std::string& reason, Done done);
+  void EndJob(int64_t id, store::JobState state, const absl::Status& reason, Done done);
   void ForgetTasks(int64_t id);
   void CountDone(Task& task);
   void HandleEvents();

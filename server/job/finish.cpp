@@ -28,7 +28,18 @@ JobView ViewOfRow(const store::JobRow& row) {
   view.row = row;
   view.tasks_done = row.state == store::JobState::kDone ? row.tasks : 0;
   view.artifacts = ParseOutputs(row.artifacts).value_or(TaskOutputs{});
+  view.phases = ParsePhases(row.phases).value_or(std::vector<PhaseView>{});
   return view;
+}
+
+std::vector<PhaseView> PhasesOf(const Job& job) {
+  std::vector<PhaseView> phases;
+  for (const auto& [phase, progress] : job.phases) {
+    const sched::Time wall =
+        progress.began ? std::max(sched::Time(0), progress.ended - *progress.began) : sched::Time(0);
+    phases.push_back({phase, progress.done, progress.total, progress.run, wall});
+  }
+  return phases;
 }
 
 }  // namespace
@@ -54,9 +65,9 @@ JobView Coordinator::ViewOf(const Job& job) const {
   view.row = job.row;
   view.tasks_done = job.tasks_done;
   view.artifacts = ArtifactsOf(job);
+  view.phases = PhasesOf(job);
   std::chrono::microseconds left{0};
   for (const auto& [phase, progress] : job.phases) {
-    view.phases.push_back({phase, progress.done, progress.total});
     const auto kind = std::find_if(kinds_.begin(), kinds_.end(), [&](const plan::Kind& k) { return k.kind == phase; });
     left += Scaled(progress.left, sched_.SpeedRatio(static_cast<int>(kind - kinds_.begin())));
   }
@@ -125,7 +136,7 @@ void Coordinator::ForgetTasks(int64_t id) {
   }
 }
 
-void Coordinator::EndJob(int64_t id, store::JobState state, const std::string& reason, Done done) {
+void Coordinator::EndJob(int64_t id, store::JobState state, const absl::Status& reason, Done done) {
   const auto found = jobs_.find(id);
   if (found == jobs_.end() || found->second.ending) {
     if (done) writer_->Submit([](store::Tables&) { return absl::OkStatus(); }, std::move(done));
@@ -136,9 +147,11 @@ void Coordinator::EndJob(int64_t id, store::JobState state, const std::string& r
   job.ending = true;
   store::JobRow row = job.row;
   row.state = state;
-  row.reason = reason;
+  row.reason = std::string(reason.message());
+  row.code = static_cast<int>(reason.code());
   row.finished_us = WallNowUs();
   row.artifacts = SerializeOutputs(ArtifactsOf(job));
+  row.phases = SerializePhases(PhasesOf(job));
   ForgetTasks(id);
   job.stages.clear();
   const auto write = [row](store::Tables& tables) -> absl::Status {
@@ -161,7 +174,7 @@ absl::Status Coordinator::Cancel(int64_t id) {
   std::promise<absl::Status> promise;
   {
     const Lock lock(mutex_);
-    EndJob(id, store::JobState::kCancelled, "cancelled",
+    EndJob(id, store::JobState::kCancelled, absl::CancelledError("cancelled"),
            [&](const absl::Status& status) { promise.set_value(status); });
     HandleEvents();
     Dispatch();

@@ -12,7 +12,8 @@ namespace bakewell::job {
 struct Options {
   std::filesystem::path folder;  // database and blobs; made if it is missing
   int64_t quota_bytes = 0;       // of the blob store; 0: none
-  store::AccountRow defaults;    // limits of users without a row of their own
+  store::Durability durability = store::Durability::kSafe;
+  store::AccountRow defaults;  // limits of users without a row of their own
   sched::Options sched;
   int io_threads = 8;
   std::function<sched::Time()> steady_now;    // default: std::chrono::steady_clock

@@ -21,12 +21,16 @@ struct Task {
 struct Phase {
   int64_t done = 0, total = 0;
   std::chrono::microseconds left{0};  // estimated, of what is not done
+  std::chrono::microseconds run{0};   // measured
+  std::optional<sched::Time> began;   // first lease
+  sched::Time ended{0};               // last result
 };
 struct Job {
   store::JobRow row;
   std::vector<plan::TaskGraph> stages;  // without the tasks' specs once they are in tasks_
   std::map<std::string, Phase> phases;
   int64_t tasks_done = 0;
+  absl::Status last_failure;  // of a task of its
   bool changed = true, ending = false;
 };
 struct Worker {

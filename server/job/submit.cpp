@@ -144,21 +144,14 @@ absl::StatusOr<SubmitResult> Coordinator::Submit(const SubmitRequest& request) {
   // From here until the job is active, nothing that is known may be collected.
   const std::shared_lock collecting(collecting_);
   BAKEWELL_ASSIGN_OR_RETURN(std::vector<Stage> stages, PlanKnown({request.scene, request.settings}, {}, {}));
-  store::JobRow row{0,
-                    request.user,
-                    request.client_key,
-                    request.name,
-                    store::JobState::kRunning,
-                    request.priority,
-                    request.scene,
-                    request.settings,
-                    WallNowUs(),
-                    0,
-                    "",
-                    0,
-                    0,
-                    0,
-                    ""};
+  store::JobRow row;
+  row.user = request.user;
+  row.client_key = request.client_key;
+  row.name = request.name;
+  row.priority = request.priority;
+  row.scene = request.scene;
+  row.settings = request.settings;
+  row.submitted_us = WallNowUs();
   for (const Stage& stage : stages) row.tasks += static_cast<int64_t>(stage.graph.tasks.size());
   if (account.max_tasks > 0 && row.tasks > account.max_tasks) {
     return absl::ResourceExhaustedError(
@@ -286,7 +279,7 @@ void Coordinator::ContinueLater(int64_t id) {
     const absl::Status status = ContinueJob(id);
     if (status.ok()) return;
     const Lock lock(mutex_);
-    EndJob(id, store::JobState::kFailed, std::string(status.message()), {});
+    EndJob(id, store::JobState::kFailed, status, {});
   });
 }
 

@@ -14,9 +14,14 @@ namespace bakewell::job {
 
 // A job as clients see it.
 struct PhaseView {
-  std::string phase;
+  std::string phase;  // the task kind
   int64_t done = 0, total = 0;
+  // What its tasks took together, and from its first lease to its last result; of this process's life.
+  std::chrono::microseconds run{0}, wall{0};
 };
+// For the database. Parse is safe on hostile bytes: kDataLoss.
+std::string SerializePhases(const std::vector<PhaseView>& phases);
+absl::StatusOr<std::vector<PhaseView>> ParsePhases(std::string_view bytes);
 
 struct JobView {
   store::JobRow row;
@@ -74,6 +79,7 @@ struct LeaseNews {
   std::vector<TaskLease> leases;
   std::vector<sched::LeaseToken> revoked;
   bool drain = false;
+  bool superseded = false;  // another connection of this worker takes this one's place
 };
 
 // How leases reach a worker. Called with the coordinator locked: it must only hand the news on, and not call back.

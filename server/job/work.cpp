@@ -57,6 +57,8 @@ uint64_t Coordinator::Connect(sched::WorkerId id, LeaseSink sink) {
   const Lock lock(mutex_);
   const auto worker = workers_.find(id);
   if (worker == workers_.end()) return 0;
+  // The older one is told: if it is the true one, it comes back.
+  if (worker->second.sink) worker->second.sink({{}, {}, false, true});
   worker->second.sink = std::move(sink);
   worker->second.credit = 0;
   worker->second.connection = next_connection_++;
@@ -129,6 +131,10 @@ TaskSpec Coordinator::Resolve(const TaskSpec& spec) const {
 // The lease as the worker gets it; nothing if its result turned out to be known under its action key.
 std::optional<TaskLease> Coordinator::Prepare(const sched::Grant& grant) {
   const Task& task = TaskOf(grant.task);
+  for (const int64_t job : task.jobs) {
+    std::optional<sched::Time>& began = jobs_.at(job).phases[task.spec.kind].began;
+    if (!began) began = Now();
+  }
   if (IsResolved(task.spec)) {
     return TaskLease{grant.token, task.key, SerializeSpec(task.spec), grant.run_limit, task.memory_bytes};
   }
@@ -191,6 +197,7 @@ void Coordinator::CountDone(Task& task) {
     Phase& phase = job.phases[task.spec.kind];
     ++phase.done;
     phase.left -= task.cost;
+    phase.ended = Now();
     ++job.tasks_done;
     job.changed = true;
     const auto& last = job.stages.back();
@@ -233,7 +240,11 @@ void Coordinator::Complete(const CompletedTask& completed, Done done) {
   ++stats_.completed;
   stats_.run_us += completed.run.count();
   if (const auto worker = workers_.find(completed.worker); worker != workers_.end()) ++worker->second.done;
-  for (const int64_t job : task.jobs) jobs_.at(job).row.run_us += completed.run.count() / std::ssize(task.jobs);
+  for (const int64_t id : task.jobs) {
+    Job& job = jobs_.at(id);
+    job.row.run_us += completed.run.count() / std::ssize(task.jobs);
+    job.phases[task.spec.kind].run += completed.run / std::ssize(task.jobs);
+  }
   RememberResult(task, completed.run, std::move(done));
   CountDone(task);
   HandleEvents();
@@ -294,7 +305,8 @@ bool Coordinator::RemakeInputs(const FailedTask& failed) {
     if (digest == nullptr || blobs_->Has(*digest)) continue;
     lost = true;
     if (made == nullptr) {
-      const std::string reason = absl::StrCat("input '", input.name, "' was lost on the server: submit it again");
+      const auto reason =
+          absl::DataLossError(absl::StrCat("input '", input.name, "' was lost on the server: submit it again"));
       const std::vector<int64_t> jobs = TaskOf(id).jobs;
       for (const int64_t job : jobs) EndJob(job, store::JobState::kFailed, reason, {});
       return true;
@@ -338,7 +350,7 @@ void Coordinator::Fail(const FailedTask& failed) {
     if (sched_.Fail(found->second, failed.token, kind, Now())) {
       ++stats_.failed;
       if (worker != workers_.end()) ++worker->second.failed;
-      for (const int64_t job : task.jobs) jobs_.at(job).row.reason = std::string(failed.status.message());
+      for (const int64_t job : task.jobs) jobs_.at(job).last_failure = failed.status;
     }
   }
   HandleEvents();
@@ -363,12 +375,13 @@ void Coordinator::HandleEvents() {
       const auto worker = workers_.find(event.worker);
       switch (event.kind) {
         case Kind::kJobDone:
-          EndJob(job, store::JobState::kDone, "", {});
+          EndJob(job, store::JobState::kDone, absl::OkStatus(), {});
           break;
         case Kind::kJobFailed: {
           const auto found = jobs_.find(job);
-          const std::string last = found == jobs_.end() ? "" : found->second.row.reason;
-          EndJob(job, store::JobState::kFailed, last.empty() ? "workers were lost again and again" : last, {});
+          const absl::Status last = found == jobs_.end() ? absl::OkStatus() : found->second.last_failure;
+          EndJob(job, store::JobState::kFailed,
+                 last.ok() ? absl::UnavailableError("workers were lost again and again") : last, {});
           break;
         }
         case Kind::kRevoked:

@@ -1,6 +1,7 @@
 #include "server/plan/level_planner.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 
@@ -16,11 +17,12 @@ namespace {
 using level_task::KindName;
 using std::chrono::microseconds;
 
-// What a task should take, and measured costs on one core of the build machine (tests/bench has the machine); the
+// Measured costs on one core of the build machine (tests/bench has the machine); the
 // scheduler corrects them by what it sees.
-constexpr double kTaskUs = 2e6;
 constexpr double kPhotonUs = 4;
 constexpr double kSampleUs = 2.5;
+constexpr double kFinishUs = 500'000;
+constexpr double kReportUs = 20'000;
 constexpr int64_t kTaskBytes = int64_t{256} << 20;  // level, photons and cache of a middling scene
 
 double SamplesOf(Quality quality) {
@@ -40,6 +42,7 @@ struct Context {
   Digest scene;
   TaskKey chart;
   BakeSettings settings;
+  double task_us;  // what a task should take
 };
 
 // The settings that a kind looks at; the others are defaults, so that they change no key.
@@ -58,6 +61,8 @@ std::string SettingsFor(const KindName& kind, BakeSettings settings) {
   settings.texels_per_metre = defaults.texels_per_metre;
   if (kind.kind == level_task::kReport.kind) return SettingsJson(defaults);
   if (kind.kind == level_task::kGather.kind) return SettingsJson(settings);
+  const bool filters = kind.kind == level_task::kFinish.kind;
+  settings.filter = filters ? settings.filter : defaults.filter;
   settings.target_error = defaults.target_error;
   settings.min_samples = defaults.min_samples;
   settings.max_samples = defaults.max_samples;
@@ -91,12 +96,13 @@ struct TileGroup {
   double cost_us;
 };
 
-// Consecutive tiles of one page, together about kTaskUs.
-std::vector<TileGroup> GroupTiles(const level_task::Survey& survey, uint32_t begin, uint32_t end, double texel_us) {
+// Consecutive tiles of one page, together about `task_us`.
+std::vector<TileGroup> GroupTiles(const level_task::Survey& survey, uint32_t begin, uint32_t end, double texel_us,
+                                  double task_us) {
   std::vector<TileGroup> groups;
   for (uint32_t tile = begin; tile < end; ++tile) {
     const double cost_us = texel_us * survey.texels_of_tile[tile];
-    if (groups.empty() || groups.back().cost_us + cost_us > kTaskUs) groups.push_back({tile, tile, 0});
+    if (groups.empty() || groups.back().cost_us + cost_us > task_us) groups.push_back({tile, tile, 0});
     groups.back().end = tile + 1;
     groups.back().cost_us += cost_us;
   }
@@ -105,7 +111,7 @@ std::vector<TileGroup> GroupTiles(const level_task::Survey& survey, uint32_t beg
 
 TaskKey AddPhotons(const Context& context, const level_task::Survey& survey, TaskGraph& graph) {
   const double cost_us = kPhotonUs * static_cast<double>(survey.photons);
-  const uint32_t batches = static_cast<uint32_t>(std::clamp(cost_us / kTaskUs, 1.0, 256.0));
+  const uint32_t batches = static_cast<uint32_t>(std::clamp(cost_us / context.task_us, 1.0, 256.0));
   std::vector<TaskKey> makers;
   for (uint32_t batch = 0; batch < batches; ++batch) {
     PlannedTask task = MakeTask(context, level_task::kEmit, batch, batches, cost_us / batches);
@@ -118,9 +124,9 @@ TaskKey AddPhotons(const Context& context, const level_task::Survey& survey, Tas
   return Add(graph, std::move(density));
 }
 
-// The tasks of one page: its tiles, and the page itself. Returns the gather tasks.
-std::vector<TaskKey> AddPage(const Context& context, const std::vector<TileGroup>& groups, uint32_t page,
-                             uint32_t first_tile, const TaskKey& cache, TaskGraph& graph) {
+// The tasks of one page: its tiles, and the page itself, whose key it returns.
+TaskKey AddPage(const Context& context, const std::vector<TileGroup>& groups, uint32_t page, uint32_t first_tile,
+                const TaskKey& cache, TaskGraph& graph) {
   std::vector<TaskKey> makers;
   for (const TileGroup& group : groups) {
     PlannedTask task = MakeTask(context, level_task::kGather, group.begin, group.end, group.cost_us);
@@ -128,11 +134,39 @@ std::vector<TaskKey> AddPage(const Context& context, const std::vector<TileGroup
     Need(task, "cache", cache, "cache");
     makers.push_back(Add(graph, std::move(task)));
   }
-  PlannedTask finish = MakeTask(context, level_task::kFinish, page, first_tile, kTaskUs / 4);
+  PlannedTask finish = MakeTask(context, level_task::kFinish, page, first_tile, kFinishUs);
   Need(finish, "layout", context.chart, "layout");
   for (size_t i = 0; i < makers.size(); ++i) Need(finish, absl::StrCat("lights", i), makers[i], "lights");
-  graph.deliver.push_back(Add(graph, std::move(finish)));
-  return makers;
+  const TaskKey key = Add(graph, std::move(finish));
+  for (const char* ending : {".irradiance.exr", ".png", ".sh.exr", ".variance.exr"}) {
+    const std::string name = absl::StrCat("lightmap-", page, ending);
+    graph.artifacts.push_back({name, {key, name}});
+  }
+  return key;
+}
+
+// Area of what gets a lightmap [m^2].
+double LightmappedArea(const Scene& scene) {
+  double area = 0;
+  for (const Object& object : scene.objects) {
+    if (!object.lightmapped) continue;
+    for (size_t i = 0; i + 2 < object.index.size(); i += 3) {
+      const Vec3f a = object.position[object.index[i]], b = object.position[object.index[i + 1]],
+                  c = object.position[object.index[i + 2]];
+      area += Length(Cross(ToDouble(b - a), ToDouble(c - a))) / 2;
+    }
+  }
+  return area;
+}
+
+// A page side or a density that asks for more texels than workers have memory for.
+absl::Status CheckTexels(const Scene& scene, const BakeSettings& settings, double max_texels) {
+  const double side = settings.resolution, density = static_cast<double>(settings.texels_per_metre);
+  const double texels = side > 0 ? side * side : density * density * LightmappedArea(scene);
+  if (texels <= max_texels) return absl::OkStatus();
+  return absl::ResourceExhaustedError(absl::StrFormat(
+      "the settings ask for %.3g texels; %.3g are allowed: lower the resolution or the texels per metre", texels,
+      max_texels));
 }
 
 absl::Status CheckSurvey(const level_task::Survey& survey) {
@@ -175,21 +209,21 @@ absl::StatusOr<BakeSettings> ReadSettings(const std::string& bytes) {
 
 std::vector<Kind> LevelPlanner::Kinds() const {
   std::vector<Kind> kinds;
-  for (const KindName& name : {level_task::kChart, level_task::kSurvey, level_task::kEmit, level_task::kDensity,
-                               level_task::kGather, level_task::kFinish, level_task::kReport}) {
+  for (const KindName& name : level_task::kAll) {
     kinds.push_back({name.kind, name.code_version});
   }
   return kinds;
 }
 
 absl::StatusOr<TaskGraph> LevelPlanner::Plan(const PlanRequest& request, const BlobReader& read) const {
-  Context context{request.scene, {}, {}};
+  Context context{request.scene, {}, {}, TaskUs()};
   BAKEWELL_ASSIGN_OR_RETURN(context.settings, ReadSettings(request.settings));
   BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, read(request.scene));
   const auto scene = ParseScene(std::as_bytes(std::span(bytes)));
   if (!scene.ok()) {
     return absl::InvalidArgumentError(absl::StrCat("the scene is malformed: ", scene.status().message()));
   }
+  BAKEWELL_RETURN_IF_ERROR(CheckTexels(*scene, context.settings, limits_.max_texels));
   double triangles = 0;
   for (const Object& object : scene->objects) triangles += static_cast<double>(object.index.size()) / 3;
   TaskGraph graph;
@@ -202,26 +236,27 @@ absl::StatusOr<TaskGraph> LevelPlanner::Plan(const PlanRequest& request, const B
 
 absl::StatusOr<TaskGraph> LevelPlanner::Continue(const PlanRequest& request, const std::vector<TaskGraph>& so_far,
                                                  const TaskOutputs& done, const BlobReader& read) const {
-  Context context{request.scene, so_far[0].tasks[0].key, {}};
+  Context context{request.scene, so_far[0].tasks[0].key, {}, TaskUs()};
   BAKEWELL_ASSIGN_OR_RETURN(context.settings, ReadSettings(request.settings));
   BAKEWELL_ASSIGN_OR_RETURN(const level_task::Survey survey, SurveyFrom(done, read));
   const double texel_us = kSampleUs * SamplesOf(context.settings.quality);
   TaskGraph graph;
   const TaskKey cache = AddPhotons(context, survey, graph);
-  std::vector<TaskKey> gathers;
+  std::vector<TaskKey> pages;
   uint32_t begin = 0;
   for (uint32_t page = 0; page < survey.tile_end_of_page.size(); ++page) {
     const uint32_t end = survey.tile_end_of_page[page];
-    const auto makers = AddPage(context, GroupTiles(survey, begin, end, texel_us), page, begin, cache, graph);
-    gathers.insert(gathers.end(), makers.begin(), makers.end());
+    pages.push_back(AddPage(context, GroupTiles(survey, begin, end, texel_us, TaskUs()), page, begin, cache, graph));
     begin = end;
   }
-  PlannedTask report = MakeTask(context, level_task::kReport, 0, 0, kTaskUs / 100);
+  PlannedTask report = MakeTask(context, level_task::kReport, 0, 0, kReportUs);
   report.spec.inputs.clear();
-  for (size_t i = 0; i < gathers.size(); ++i) Need(report, absl::StrCat("lights", i), gathers[i], "lights");
+  Need(report, "survey", so_far[0].tasks[1].key, "survey");
+  Need(report, "totals", cache, "totals");
+  for (size_t i = 0; i < pages.size(); ++i) Need(report, absl::StrCat("tally", i), pages[i], "tally");
   graph.deliver.push_back(Add(graph, std::move(report)));
   // Clients write scene.glb with it.
-  graph.artifacts.push_back({"atlas-layout.bin", {context.chart, "layout"}});
+  graph.artifacts.push_back({level_task::kLayoutArtifact, {context.chart, "layout"}});
   return graph;
 }
 

@@ -49,7 +49,10 @@ v1::Job MessageOf(const job::JobView& view) {
   message.set_user(view.row.user);
   message.set_name(view.row.name);
   message.set_state(static_cast<v1::JobState>(static_cast<int>(view.row.state) + v1::RUNNING));
-  if (view.row.state != store::JobState::kRunning) message.set_reason(view.row.reason);
+  if (view.row.state != store::JobState::kRunning) {
+    message.set_reason(view.row.reason);
+    message.set_code(view.row.code);
+  }
   message.set_priority(view.row.priority);
   message.set_scene(DigestToBytes(view.row.scene));
   message.set_submitted_us(view.row.submitted_us);
@@ -63,6 +66,8 @@ v1::Job MessageOf(const job::JobView& view) {
     progress.set_phase(phase.phase);
     progress.set_done(phase.done);
     progress.set_total(phase.total);
+    progress.set_run_us(phase.run.count());
+    progress.set_wall_us(phase.wall.count());
   }
   if (view.left_low.count() >= 0) {
     message.set_left_low_us(view.left_low.count());
@@ -149,25 +154,27 @@ grpc::ServerWriteReactor<v1::FetchChunk>* BakeService::Fetch(grpc::CallbackServe
                                                              const v1::FetchRequest* request) {
   using Refused = RefusedStream<v1::FetchChunk>;
   const auto caller = services_.auth.Check(*context, Any(Scope::kRead));
-  if (!caller.ok()) return new Refused(caller.status());
+  if (!caller.ok()) return new Refused(services_, *context, caller.status());
   auto slot = std::make_shared<BlobService::Slot>(transfers_, services_.max_transfers);
-  if (!slot->granted()) return new Refused(absl::ResourceExhaustedError("too many transfers at a time: try again"));
+  if (!slot->granted())
+    return new Refused(services_, *context, absl::ResourceExhaustedError("too many transfers at a time: try again"));
   const auto choose = [this, request, who = *caller]() -> absl::StatusOr<BlobRange> {
     BAKEWELL_RETURN_IF_ERROR(Find(who, request->job_id()).status());
     BAKEWELL_ASSIGN_OR_RETURN(const bakewell::TaskOutput artifact,
                               services_.coordinator.FindArtifact(request->job_id(), request->name()));
     return BlobRange{artifact.digest, request->offset()};
   };
-  return new BlobStream<v1::FetchChunk>(services_.coordinator, choose, [slot]() mutable { slot.reset(); });
+  return new BlobStream<v1::FetchChunk>(services_, *context, choose, [slot]() mutable { slot.reset(); });
 }
 
 grpc::ServerWriteReactor<v1::Job>* BakeService::Watch(grpc::CallbackServerContext* context,
                                                       const v1::WatchRequest* request) {
   using Refused = RefusedStream<v1::Job>;
   const auto caller = services_.auth.Check(*context, Any(Scope::kRead));
-  if (!caller.ok()) return new Refused(caller.status());
+  if (!caller.ok()) return new Refused(services_, *context, caller.status());
   auto slot = std::make_shared<BlobService::Slot>(watches_, kMaxWatches);
-  if (!slot->granted()) return new Refused(absl::ResourceExhaustedError("too many watches: poll with Get"));
+  if (!slot->granted())
+    return new Refused(services_, *context, absl::ResourceExhaustedError("too many watches: poll with Get"));
   const auto look = [this, who = *caller, id = request->job_id()] { return Find(who, id); };
   return WatchStream::Start(services_.coordinator, request->job_id(), look, [slot]() mutable { slot.reset(); });
 }

@@ -25,8 +25,12 @@ absl::Status ListMissing(const store::BlobStore& blobs, const v1::FindMissingReq
 // Receives one blob. Deletes itself.
 class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest> {
  public:
-  UploadStream(Services& services, std::atomic<int>& transfers, const absl::Status& refused)
-      : services_(services), slot_(transfers, services.max_transfers) {
+  UploadStream(Services& services, grpc::CallbackServerContext& context, std::atomic<int>& transfers,
+               const absl::Status& refused)
+      : services_(services),
+        peer_(context.peer()),
+        slot_(transfers, services.max_transfers),
+        stall_(services.stalls, context) {
     if (!refused.ok()) {
       End(refused);
     } else if (!slot_.granted()) {
@@ -36,6 +40,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest> {
     }
   }
   void OnReadDone(bool ok) override {
+    stall_.Touch();
     services_.coordinator.io().Post([this, ok] { ok ? Take() : Complete(); });
   }
   void OnDone() override { delete this; }
@@ -43,7 +48,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest> {
  private:
   void End(const absl::Status& status) {
     upload_.reset();
-    Finish(ToGrpc(status));
+    Finish(services_.Answer(peer_, status));
   }
 
   absl::Status Begin() {
@@ -84,7 +89,9 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest> {
   }
 
   Services& services_;
+  const std::string peer_;
   const BlobService::Slot slot_;
+  StallGuard::Entry stall_;
   v1::UploadRequest request_;
   Digest digest_;
   std::unique_ptr<store::BlobStore::Upload> upload_;
@@ -102,21 +109,22 @@ grpc::ServerUnaryReactor* BlobService::FindMissing(grpc::CallbackServerContext* 
 grpc::ServerReadReactor<v1::UploadRequest>* BlobService::Upload(grpc::CallbackServerContext* context,
                                                                 v1::UploadResponse*) {
   const auto caller = services_.auth.Check(*context, Any(Scope::kSubmit, Scope::kWork));
-  return new UploadStream(services_, transfers_, caller.status());
+  return new UploadStream(services_, *context, transfers_, caller.status());
 }
 
 grpc::ServerWriteReactor<v1::DownloadChunk>* BlobService::Download(grpc::CallbackServerContext* context,
                                                                    const v1::DownloadRequest* request) {
   using Refused = RefusedStream<v1::DownloadChunk>;
   const auto caller = services_.auth.Check(*context, Any(Scope::kWork));
-  if (!caller.ok()) return new Refused(caller.status());
+  if (!caller.ok()) return new Refused(services_, *context, caller.status());
   auto slot = std::make_shared<Slot>(transfers_, services_.max_transfers);
-  if (!slot->granted()) return new Refused(absl::ResourceExhaustedError("too many transfers at a time: try again"));
+  if (!slot->granted())
+    return new Refused(services_, *context, absl::ResourceExhaustedError("too many transfers at a time: try again"));
   const auto choose = [request]() -> absl::StatusOr<BlobRange> {
     BAKEWELL_ASSIGN_OR_RETURN(const Digest digest, DigestFromBytes(request->digest()));
     return BlobRange{digest, request->offset()};
   };
-  return new BlobStream<v1::DownloadChunk>(services_.coordinator, choose, [slot]() mutable { slot.reset(); });
+  return new BlobStream<v1::DownloadChunk>(services_, *context, choose, [slot]() mutable { slot.reset(); });
 }
 
 }  // namespace bakewell::rpc

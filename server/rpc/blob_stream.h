@@ -9,7 +9,7 @@
 
 #include "proto/rpc/channel.h"
 #include "proto/rpc/status.h"
-#include "server/job/coordinator.h"
+#include "server/rpc/call.h"
 
 namespace bakewell::rpc {
 
@@ -24,11 +24,17 @@ using BlobChooser = std::function<absl::StatusOr<BlobRange>()>;
 template <typename Chunk>
 class BlobStream final : public grpc::ServerWriteReactor<Chunk> {
  public:
-  BlobStream(job::Coordinator& coordinator, BlobChooser choose, std::function<void()> ended)
-      : coordinator_(coordinator), choose_(std::move(choose)), ended_(std::move(ended)) {
+  BlobStream(Services& services, grpc::CallbackServerContext& context, BlobChooser choose, std::function<void()> ended)
+      : services_(services),
+        coordinator_(services.coordinator),
+        peer_(context.peer()),
+        choose_(std::move(choose)),
+        ended_(std::move(ended)),
+        stall_(services.stalls, context) {
     coordinator_.io().Post([this] { Start(); });
   }
   void OnWriteDone(bool ok) override {
+    stall_.Touch();
     if (ok)
       coordinator_.io().Post([this] { Next(); });
     else
@@ -45,7 +51,7 @@ class BlobStream final : public grpc::ServerWriteReactor<Chunk> {
     if (status.ok())
       Next();
     else
-      this->Finish(ToGrpc(status));
+      this->Finish(services_.Answer(peer_, status));
   }
 
   absl::Status Open() {
@@ -73,9 +79,12 @@ class BlobStream final : public grpc::ServerWriteReactor<Chunk> {
     }
   }
 
+  const Services& services_;
   job::Coordinator& coordinator_;
+  const std::string peer_;
   BlobChooser choose_;
   std::function<void()> ended_;
+  StallGuard::Entry stall_;
   std::unique_ptr<store::BlobStore::Download> download_;
   int64_t left_ = 0;
   bool sent_ = false;
@@ -86,7 +95,9 @@ class BlobStream final : public grpc::ServerWriteReactor<Chunk> {
 template <typename Chunk>
 class RefusedStream final : public grpc::ServerWriteReactor<Chunk> {
  public:
-  explicit RefusedStream(const absl::Status& status) { this->Finish(ToGrpc(status)); }
+  RefusedStream(const Services& services, const grpc::CallbackServerContext& context, const absl::Status& status) {
+    this->Finish(services.Answer(context.peer(), status));
+  }
   void OnDone() override { delete this; }
 };
 

@@ -9,6 +9,8 @@
 
 #include "proto/rpc/status.h"
 #include "server/rpc/auth.h"
+#include "server/rpc/refusal_log.h"
+#include "server/rpc/stall_guard.h"
 
 namespace bakewell::rpc {
 
@@ -16,8 +18,16 @@ namespace bakewell::rpc {
 struct Services {
   job::Coordinator& coordinator;
   Auth& auth;
+  RefusalLog& refusals;
+  StallGuard& stalls;
   int64_t max_blob_bytes = int64_t{4} << 30;
   int max_transfers = 256;  // uploads and downloads at a time
+
+  // The status as gRPC has it; a refusal is logged.
+  grpc::Status Answer(const std::string& peer, const absl::Status& status) const {
+    if (!status.ok()) refusals.Note(peer, status, coordinator.WallNowUs());
+    return ToGrpc(status);
+  }
 };
 
 // A unary call that may wait for a disk: `work(caller)` runs on the coordinator's io threads and gives the status.
@@ -26,11 +36,12 @@ grpc::ServerUnaryReactor* OnIo(Services& services, grpc::CallbackServerContext* 
   auto* reactor = context->DefaultReactor();
   const auto caller = services.auth.Check(*context, scopes);
   if (!caller.ok()) {
-    reactor->Finish(ToGrpc(caller.status()));
+    reactor->Finish(services.Answer(context->peer(), caller.status()));
     return reactor;
   }
-  services.coordinator.io().Post(
-      [reactor, work = std::move(work), caller = *caller]() mutable { reactor->Finish(ToGrpc(work(caller))); });
+  services.coordinator.io().Post([reactor, context, &services, work = std::move(work), caller = *caller]() mutable {
+    reactor->Finish(services.Answer(context->peer(), work(caller)));
+  });
   return reactor;
 }
 
@@ -39,7 +50,7 @@ template <typename Work>
 grpc::ServerUnaryReactor* AtOnce(Services& services, grpc::CallbackServerContext* context, int scopes, Work work) {
   auto* reactor = context->DefaultReactor();
   const auto caller = services.auth.Check(*context, scopes);
-  reactor->Finish(ToGrpc(caller.ok() ? work(*caller) : caller.status()));
+  reactor->Finish(services.Answer(context->peer(), caller.ok() ? work(*caller) : caller.status()));
   return reactor;
 }
 

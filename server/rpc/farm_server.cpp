@@ -71,8 +71,13 @@ void SetLimits(const ServerOptions& options, grpc::ServerBuilder& builder) {
 
 struct FarmServer::Parts {
   explicit Parts(job::Coordinator& coordinator, const ServerOptions& options)
-      : auth(coordinator), services{coordinator, auth, options.max_blob_bytes} {}
+      : auth(coordinator),
+        refusals(coordinator.options().log),
+        stalls(options.stall_limit),
+        services{coordinator, auth, refusals, stalls, options.max_blob_bytes} {}
   Auth auth;
+  RefusalLog refusals;
+  StallGuard stalls;
   Services services;
   BlobService blob{services};
   BakeService bake{services};

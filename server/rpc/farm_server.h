@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -20,7 +21,8 @@ struct ServerOptions {
   std::filesystem::path client_ca_file;  // clients must show a certificate that this signed
   bool allow_plain_text = false;         // beyond loopback without TLS: for networks that encrypt by themselves
   int64_t max_blob_bytes = int64_t{4} << 30;
-  int64_t memory_bytes = int64_t{1} << 30;  // of gRPC's buffers; above it calls are refused
+  std::chrono::milliseconds stall_limit = std::chrono::seconds(30);  // a transfer in which nothing moves ends
+  int64_t memory_bytes = int64_t{1} << 30;                           // of gRPC's buffers; above it calls are refused
 };
 
 // The services of proto/bakewell/v1 on a port. Ends its calls before it goes; the coordinator must outlive it.

@@ -12,7 +12,8 @@ void FillLease(const job::TaskLease& lease, v1::TaskLease& message) {
   message.set_memory_bytes(lease.memory_bytes);
 }
 
-LeaseStream::LeaseStream(Services& services, const absl::Status& refused) : services_(services) {
+LeaseStream::LeaseStream(Services& services, const std::string& peer, const absl::Status& refused)
+    : services_(services), peer_(peer) {
   if (refused.ok())
     StartRead(&request_);
   else
@@ -41,6 +42,7 @@ void LeaseStream::Push(job::LeaseNews news) {
   for (const job::TaskLease& lease : news.leases) FillLease(lease, *waiting_.add_leases());
   for (const sched::LeaseToken token : news.revoked) waiting_.add_revoked(static_cast<uint64_t>(token));
   if (news.drain) waiting_.set_drain(true);
+  if (news.superseded) waiting_.set_superseded(true);
   if (!writing_ && !ending_) WriteLocked();
 }
 
@@ -54,7 +56,8 @@ void LeaseStream::OnWriteDone(bool ok) {
   {
     const std::lock_guard lock(mutex_);
     writing_ = false;
-    const bool more = waiting_.leases_size() > 0 || waiting_.revoked_size() > 0 || waiting_.drain();
+    const bool more =
+        waiting_.leases_size() > 0 || waiting_.revoked_size() > 0 || waiting_.drain() || waiting_.superseded();
     if (ok && !ending_) {
       if (more) WriteLocked();
       return;
@@ -71,7 +74,7 @@ void LeaseStream::End(const absl::Status& status) {
   ending_ = true;
   if (writing_ || finished_) return;  // Finish comes after the write
   finished_ = true;
-  Finish(ToGrpc(end_));
+  Finish(services_.Answer(peer_, end_));
 }
 
 void LeaseStream::OnDone() {

@@ -14,7 +14,7 @@ void FillLease(const job::TaskLease& lease, v1::TaskLease& message);
 // by the leases that can be revoked. Deletes itself.
 class LeaseStream final : public grpc::ServerBidiReactor<v1::LeaseRequest, v1::LeaseResponse> {
  public:
-  LeaseStream(Services& services, const absl::Status& refused);
+  LeaseStream(Services& services, const std::string& peer, const absl::Status& refused);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -28,6 +28,7 @@ class LeaseStream final : public grpc::ServerBidiReactor<v1::LeaseRequest, v1::L
   void End(const absl::Status& status);
 
   Services& services_;
+  const std::string peer_;
   v1::LeaseRequest request_;
   sched::WorkerId worker_{};
   uint64_t connection_ = 0;

@@ -107,7 +107,7 @@ grpc::ServerUnaryReactor* WorkerService::Register(grpc::CallbackServerContext* c
 
 grpc::ServerBidiReactor<v1::LeaseRequest, v1::LeaseResponse>* WorkerService::Lease(
     grpc::CallbackServerContext* context) {
-  return new LeaseStream(services_, services_.auth.Check(*context, Any(Scope::kWork)).status());
+  return new LeaseStream(services_, context->peer(), services_.auth.Check(*context, Any(Scope::kWork)).status());
 }
 
 grpc::ServerUnaryReactor* WorkerService::Heartbeat(grpc::CallbackServerContext* context,
@@ -124,7 +124,7 @@ grpc::ServerUnaryReactor* WorkerService::Complete(grpc::CallbackServerContext* c
   const auto caller = services_.auth.Check(*context, Any(Scope::kWork));
   const auto task = caller.ok() ? CompletedFrom(*request) : caller.status();
   if (!task.ok()) {
-    reactor->Finish(ToGrpc(task.status()));
+    reactor->Finish(services_.Answer(context->peer(), task.status()));
     return reactor;
   }
   services_.coordinator.Complete(*task, [reactor](const absl::Status& status) { reactor->Finish(ToGrpc(status)); });

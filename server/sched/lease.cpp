@@ -71,7 +71,7 @@ std::vector<Grant> Scheduler::Lease(WorkerId id, int count, Time now) {
   Worker& worker = found->second;
   if (worker.draining || worker.rests_until > now) return grants;
   while (static_cast<int>(grants.size()) < count) {
-    std::optional<TaskId> task = PickReady(worker, id);
+    std::optional<TaskId> task = PickReady(worker, id, now);
     if (task) task = PickHinted(worker, *task);
     if (!task) {
       task = PickStraggler(worker, id, now);
@@ -90,19 +90,21 @@ std::vector<Grant> Scheduler::Adopt(WorkerId id, TaskId task, Time now) {
   return {GrantLease(id, task, now)};
 }
 
-bool Scheduler::MayRun(const Task& task, WorkerId id) const {
-  if (std::find(task.excluded.begin(), task.excluded.end(), id) == task.excluded.end()) return true;
-  // An exclusion holds only while somebody else could run the task.
+bool Scheduler::MayRun(const Task& task, WorkerId id, Time now) const {
+  const auto own = std::find_if(task.excluded.begin(), task.excluded.end(),
+                                [&](const Exclusion& exclusion) { return exclusion.worker == id; });
+  if (own == task.excluded.end()) return true;
+  // An exclusion is for good only while somebody else could run the task.
   const auto could_elsewhere = classes_[task.class_index].workers;
-  const auto excluded = std::count_if(task.excluded.begin(), task.excluded.end(), [&](WorkerId other) {
-    const auto found = workers_.find(other);
+  const auto excluded = std::count_if(task.excluded.begin(), task.excluded.end(), [&](const Exclusion& exclusion) {
+    const auto found = workers_.find(exclusion.worker);
     return found != workers_.end() && !found->second.draining;
   });
-  return excluded >= could_elsewhere;
+  return excluded >= could_elsewhere && now >= own->until;
 }
 
-std::optional<TaskId> Scheduler::PickReady(const Worker& worker, WorkerId id) {
-  return ready_.Find(worker.classes, worker.at, [&](TaskId task) { return MayRun(TaskOf(task), id); });
+std::optional<TaskId> Scheduler::PickReady(const Worker& worker, WorkerId id, Time now) {
+  return ready_.Find(worker.classes, worker.at, [&](TaskId task) { return MayRun(TaskOf(task), id, now); });
 }
 
 std::optional<TaskId> Scheduler::PickHinted(Worker& worker, TaskId best) {
@@ -130,7 +132,7 @@ std::optional<TaskId> Scheduler::PickStraggler(const Worker& worker, WorkerId id
     if (leases_.at(task.leases.front()).worker == id || ready_.ReadyOf(task.home) > 0) continue;
     const auto& classes = worker.classes;
     if (std::find(classes.begin(), classes.end(), task.class_index) == classes.end()) continue;
-    if (MayRun(task, id)) return candidate;
+    if (MayRun(task, id, now)) return candidate;
   }
   return std::nullopt;
 }
@@ -245,15 +247,23 @@ bool Scheduler::Fail(TaskId id, LeaseToken token, FailureKind kind, Time now) {
   return true;
 }
 
+void Scheduler::Exclude(Task& task, WorkerId worker, Time now) {
+  auto own = std::find_if(task.excluded.begin(), task.excluded.end(),
+                          [&](const Exclusion& exclusion) { return exclusion.worker == worker; });
+  if (own == task.excluded.end()) own = task.excluded.insert(own, {worker, now, 0});
+  own->until = now + options_.retry * (int64_t{1} << std::min(own->times++, 6));
+}
+
 void Scheduler::Blame(TaskId id, WorkerId worker, FailureKind kind, Time now) {
   Task& task = TaskOf(id);
   // The slot of a queued task says whether it failed: take it out while that changes.
   const bool queued = task.state == State::kReady;
   if (queued) ready_.Remove(id, SlotOf(task));
   ++task.failures;
-  task.excluded.push_back(worker);
+  Exclude(task, worker, now);
   if (queued) ready_.Push(id, SlotOf(task));
-  if (kind == FailureKind::kPermanent || task.failures >= options_.max_failures) {
+  const bool given_up = std::ssize(task.excluded) >= options_.max_failures || task.failures >= options_.max_tries;
+  if (kind == FailureKind::kPermanent || given_up) {
     FailJobsOf(id);
     return;
   }

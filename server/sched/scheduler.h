@@ -108,12 +108,13 @@ class Scheduler {
 
   // lease.cpp: grants and their ends
   Grant GrantLease(WorkerId worker, TaskId task, Time now);
-  std::optional<TaskId> PickReady(const Worker& worker, WorkerId id);
+  std::optional<TaskId> PickReady(const Worker& worker, WorkerId id, Time now);
   std::optional<TaskId> PickHinted(Worker& worker, TaskId best);
   std::optional<TaskId> PickStraggler(const Worker& worker, WorkerId id, Time now);
-  bool MayRun(const Task& task, WorkerId worker) const;
+  bool MayRun(const Task& task, WorkerId worker, Time now) const;
   void EndLease(LeaseToken token);
   void RevokeLeases(TaskId id);
+  void Exclude(Task& task, WorkerId worker, Time now);
   void Blame(TaskId id, WorkerId worker, FailureKind kind, Time now);
   void BlameWorker(WorkerId id, Time now);
   void LoseLease(LeaseToken token);

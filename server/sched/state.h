@@ -10,6 +10,13 @@
 // What a Scheduler remembers of tasks, leases, jobs and workers.
 namespace bakewell::sched {
 
+// A worker that failed a task, and when it may have it again if nobody else can.
+struct Exclusion {
+  WorkerId worker;
+  Time until;
+  int times;
+};
+
 enum class State : uint8_t { kFree, kWaiting, kReady, kRunning, kDone };
 struct Task {
   State state = State::kFree;
@@ -24,7 +31,7 @@ struct Task {
   std::vector<JobId> jobs;
   std::vector<LeaseToken> leases;
   std::vector<TaskId> dependants;
-  std::vector<WorkerId> excluded;
+  std::vector<Exclusion> excluded;  // one a worker
 };
 // A lease.
 struct Held {

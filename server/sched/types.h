@@ -81,7 +81,11 @@ struct Options {
   int run_limit_factor = 20;
   int straggler_factor = 2;  // run twice after this many times the expected time, at a job's end
   Time min_straggler = std::chrono::seconds(2);
-  int max_failures = 3;                  // on different workers where there are as many
+  int max_failures = 3;  // workers that failed the task; however often one of them did, it counts once
+  // Where nobody else can take a task, a worker that failed it gets it again after `retry`, doubling up to 64 times; a
+  // task that has failed max_tries times on whomever there was fails as well.
+  Time retry = std::chrono::seconds(1);
+  int max_tries = 10;
   int max_lost = 12;                     // workers that fell silent while they held the task
   int rest_after = 5;                    // failures in a row
   Time rest = std::chrono::seconds(10);  // doubles with each further rest, up to 64 times

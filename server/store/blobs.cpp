@@ -30,31 +30,35 @@ absl::Status SyncFolder(const fs::path& folder) {
   return result == 0 ? absl::OkStatus() : FromErrno(error, absl::StrCat("syncing ", folder.string()));
 }
 
-absl::Status MakeFolders(const fs::path& root) {
+absl::Status MakeFolders(const fs::path& root, Durability durability) {
   std::error_code error;
   for (const char* folder : {"incoming", "quarantine", "blobs"}) fs::create_directories(root / folder, error);
   for (const fs::directory_entry& left : fs::directory_iterator(root / "incoming", error)) fs::remove(left, error);
+  const auto made = [&](const fs::path& folder) -> absl::Status {
+    if (fs::is_directory(folder, error)) return absl::OkStatus();
+    return absl::FailedPreconditionError(absl::StrCat("store: cannot make folders in ", root.string()));
+  };
+  if (durability == Durability::kScratch) return made(root / "blobs");
   constexpr char kDigits[] = "0123456789abcdef";
   for (int i = 0; i < 256; ++i) {
     const char name[] = {kDigits[i >> 4], kDigits[i & 15], 0};
     fs::create_directory(root / "blobs" / name, error);
   }
-  if (!fs::is_directory(root / "blobs" / "ff", error)) {
-    return absl::FailedPreconditionError(absl::StrCat("store: cannot make folders in ", root.string()));
-  }
+  BAKEWELL_RETURN_IF_ERROR(made(root / "blobs" / "ff"));
   return SyncFolder(root / "blobs");
 }
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::Open(const fs::path& root, int64_t quota_bytes) {
-  BAKEWELL_RETURN_IF_ERROR(MakeFolders(root));
-  return std::unique_ptr<BlobStore>(new BlobStore(root, quota_bytes));
+absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::Open(const fs::path& root, int64_t quota_bytes,
+                                                           Durability durability) {
+  BAKEWELL_RETURN_IF_ERROR(MakeFolders(root, durability));
+  return std::unique_ptr<BlobStore>(new BlobStore(root, quota_bytes, durability));
 }
 
 fs::path BlobStore::PathOf(const Digest& digest) const {
   const std::string hex = digest.Hex();
-  return root_ / "blobs" / hex.substr(0, 2) / hex;
+  return durability_ == Durability::kScratch ? root_ / "blobs" / hex : root_ / "blobs" / hex.substr(0, 2) / hex;
 }
 
 absl::StatusOr<std::unique_ptr<BlobStore::Upload>> BlobStore::StartUpload(const Digest& digest, int64_t size_bytes) {
@@ -96,11 +100,12 @@ absl::Status BlobStore::Upload::Finish() {
     return absl::DataLossError(
         absl::StrCat("blob ", digest_.Hex(), ": the ", size_bytes_, " bytes that came are not it; send it again"));
   }
-  if (fsync(file_) != 0) return FromErrno(errno, absl::StrCat("syncing blob ", digest_.Hex()));
+  const bool safe = store_.durability_ == Durability::kSafe;
+  if (safe && fsync(file_) != 0) return FromErrno(errno, absl::StrCat("syncing blob ", digest_.Hex()));
   const fs::path final_path = store_.PathOf(digest_);
   if (rename(path_.c_str(), final_path.c_str()) != 0) return FromErrno(errno, "moving a blob to its place");
   path_.clear();
-  BAKEWELL_RETURN_IF_ERROR(SyncFolder(final_path.parent_path()));
+  if (safe) BAKEWELL_RETURN_IF_ERROR(SyncFolder(final_path.parent_path()));
   store_.Learn(digest_, size_bytes_);
   return absl::OkStatus();
 }

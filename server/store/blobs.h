@@ -14,16 +14,19 @@
 #include "core/base/fields.h"
 #include "core/base/sha256.h"
 #include "core/base/status.h"
+#include "server/store/durability.h"
 
 namespace bakewell::store {
 
 // Content-addressed files: ROOT/blobs/ab/abcd... A blob is written to ROOT/incoming, synced, renamed, and its folder
 // synced, so a digest that Has() knows is on disk whole. Reading verifies; a blob that does not match its name is moved
 // to ROOT/quarantine and from then on missing. Names come from digests alone, never from the wire. Thread safe.
+// Durability::kScratch does not sync, and has ROOT/blobs/abcd...
 class BlobStore {
  public:
   // Deletes what a former process left in ROOT/incoming. `quota_bytes` 0: no limit.
-  static absl::StatusOr<std::unique_ptr<BlobStore>> Open(const std::filesystem::path& root, int64_t quota_bytes);
+  static absl::StatusOr<std::unique_ptr<BlobStore>> Open(const std::filesystem::path& root, int64_t quota_bytes,
+                                                         Durability durability = Durability::kSafe);
 
   // A blob on its way in; forgotten and deleted unless Finish() succeeds. One thread at a time; its store outlives it.
   class Upload {
@@ -98,12 +101,14 @@ class BlobStore {
   size_t count() const;
 
  private:
-  BlobStore(std::filesystem::path root, int64_t quota_bytes) : root_(std::move(root)), quota_bytes_(quota_bytes) {}
+  BlobStore(std::filesystem::path root, int64_t quota_bytes, Durability durability)
+      : root_(std::move(root)), quota_bytes_(quota_bytes), durability_(durability) {}
   std::filesystem::path PathOf(const Digest& digest) const;
   void Forget(const Digest& digest);
 
   const std::filesystem::path root_;
   const int64_t quota_bytes_;
+  const Durability durability_;
   mutable std::mutex mutex_;
   absl::flat_hash_map<Digest, int64_t, DigestHash> sizes_;
   std::atomic<int64_t> total_bytes_{0};

@@ -64,7 +64,8 @@ absl::Status Guarded(const std::function<void()>& work) {
   }
 }
 
-absl::StatusOr<std::unique_ptr<SQLite::Database>> OpenDatabase(const std::filesystem::path& path) {
+absl::StatusOr<std::unique_ptr<SQLite::Database>> OpenDatabase(const std::filesystem::path& path,
+                                                               Durability durability) {
   BAKEWELL_ASSIGN_OR_RETURN(auto database, Open(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE));
   int version = 0;
   BAKEWELL_RETURN_IF_ERROR(Guarded([&] { version = VersionOf(*database); }));
@@ -75,7 +76,7 @@ absl::StatusOr<std::unique_ptr<SQLite::Database>> OpenDatabase(const std::filesy
   }
   BAKEWELL_RETURN_IF_ERROR(Guarded([&] {
     database->exec("PRAGMA journal_mode=WAL");
-    database->exec("PRAGMA synchronous=FULL");
+    database->exec(durability == Durability::kSafe ? "PRAGMA synchronous=FULL" : "PRAGMA synchronous=OFF");
     database->exec("PRAGMA wal_autocheckpoint=4000");
     Migrate(*database);
   }));

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/base/status.h"
+#include "server/store/durability.h"
 
 namespace SQLite {
 class Database;
@@ -12,10 +13,12 @@ class Database;
 
 namespace bakewell::store {
 
-// Opens (and creates) the database file, with WAL and synchronous=FULL, and applies the migrations of schema/ that it
-// lacks, each in a transaction. kFailedPrecondition for a database that a newer bakewell wrote: it is left untouched.
-// Every connection is used by one thread at a time. SQLite's exceptions end in this folder.
-absl::StatusOr<std::unique_ptr<SQLite::Database>> OpenDatabase(const std::filesystem::path& path);
+// Opens (and creates) the database file, with WAL and synchronous=FULL (Durability::kScratch: OFF), and applies the
+// migrations of schema/ that it lacks, each in a transaction. kFailedPrecondition for a database that a newer bakewell
+// wrote: it is left untouched. Every connection is used by one thread at a time. SQLite's exceptions end in this
+// folder.
+absl::StatusOr<std::unique_ptr<SQLite::Database>> OpenDatabase(const std::filesystem::path& path,
+                                                               Durability durability = Durability::kSafe);
 
 // A second connection that only reads; sees what was committed when its statement starts.
 absl::StatusOr<std::unique_ptr<SQLite::Database>> OpenReadOnly(const std::filesystem::path& path);

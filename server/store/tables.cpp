@@ -24,7 +24,7 @@ Digest DigestAt(Row& row, int index) { return DigestFromBytes(BytesAt(row, index
 
 constexpr char kJobColumns[] =
     "SELECT id,user,client_key,name,state,priority,scene,settings,submitted_us,finished_us,reason,tasks,known_tasks,"
-    "run_us,artifacts FROM job ";
+    "run_us,artifacts,code,phases FROM job ";
 
 JobRow JobAt(Row& row) {
   JobRow job;
@@ -43,6 +43,8 @@ JobRow JobAt(Row& row) {
   job.known_tasks = NumberAt(row, 12);
   job.run_us = NumberAt(row, 13);
   job.artifacts = BytesAt(row, 14);
+  job.code = static_cast<int>(NumberAt(row, 15));
+  job.phases = BytesAt(row, 16);
   return job;
 }
 
@@ -59,8 +61,8 @@ Tables::Tables(std::unique_ptr<SQLite::Database> database)
 
 Tables::~Tables() = default;
 
-absl::StatusOr<std::unique_ptr<Tables>> Tables::Open(const std::filesystem::path& path) {
-  BAKEWELL_ASSIGN_OR_RETURN(auto database, OpenDatabase(path));
+absl::StatusOr<std::unique_ptr<Tables>> Tables::Open(const std::filesystem::path& path, Durability durability) {
+  BAKEWELL_ASSIGN_OR_RETURN(auto database, OpenDatabase(path, durability));
   return std::make_unique<Tables>(std::move(database));
 }
 
@@ -145,7 +147,8 @@ absl::StatusOr<int64_t> Tables::InsertJob(const JobRow& job) {
 
 absl::Status Tables::UpdateJob(const JobRow& job) {
   return Execute(
-      "UPDATE job SET state=?,priority=?,finished_us=?,reason=?,tasks=?,known_tasks=?,run_us=?,artifacts=? WHERE id=?",
+      "UPDATE job SET state=?,priority=?,finished_us=?,reason=?,tasks=?,known_tasks=?,run_us=?,artifacts=?,code=?,"
+      "phases=? WHERE id=?",
       [&](Row& row) {
         row.bind(1, static_cast<int>(job.state));
         row.bind(2, job.priority);
@@ -155,7 +158,9 @@ absl::Status Tables::UpdateJob(const JobRow& job) {
         row.bind(6, job.known_tasks);
         row.bind(7, job.run_us);
         BindBytes(row, 8, job.artifacts);
-        row.bind(9, job.id);
+        row.bind(9, job.code);
+        BindBytes(row, 10, job.phases);
+        row.bind(11, job.id);
       });
 }
 

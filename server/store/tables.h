@@ -9,6 +9,7 @@
 
 #include "core/artifact/task.h"
 #include "core/base/status.h"
+#include "server/store/durability.h"
 
 namespace SQLite {
 class Database;
@@ -17,7 +18,7 @@ class Statement;
 
 namespace bakewell::store {
 
-// Rows of schema/0001_farm.sql. Times are microseconds since 1970.
+// Rows of schema/*.sql. Times are microseconds since 1970.
 enum class JobState : int { kRunning = 0, kDone = 1, kFailed = 2, kCancelled = 3 };
 
 struct JobRow {
@@ -31,6 +32,8 @@ struct JobRow {
   std::string reason;
   int64_t tasks = 0, known_tasks = 0, run_us = 0;
   std::string artifacts;  // SerializeOutputs of the finished job
+  int code = 0;           // absl::StatusCode of `reason`
+  std::string phases;     // server/job SerializePhases of the finished job
 };
 
 struct KnownTask {
@@ -75,7 +78,8 @@ class Tables {
  public:
   explicit Tables(std::unique_ptr<SQLite::Database> database);
   // On the connections of OpenDatabase() and OpenReadOnly().
-  static absl::StatusOr<std::unique_ptr<Tables>> Open(const std::filesystem::path& path);
+  static absl::StatusOr<std::unique_ptr<Tables>> Open(const std::filesystem::path& path,
+                                                      Durability durability = Durability::kSafe);
   static absl::StatusOr<std::unique_ptr<Tables>> OpenReadOnly(const std::filesystem::path& path);
   ~Tables();
 

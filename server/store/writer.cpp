@@ -16,7 +16,8 @@ bool WorthRetrying(const absl::Status& status) {
 
 }  // namespace
 
-Writer::Writer(std::unique_ptr<Tables> tables) : tables_(std::move(tables)), thread_([this] { Loop(); }) {}
+Writer::Writer(std::unique_ptr<Tables> tables, Durability durability)
+    : tables_(std::move(tables)), durability_(durability), thread_([this] { Loop(); }) {}
 
 Writer::~Writer() {
   {
@@ -77,7 +78,7 @@ void Writer::WriteBatch(std::vector<Item>& batch) {
     trouble_ = status;
     if (status.ok()) break;
     // At the end of the program a disk that is still full costs what nobody has been told is safe.
-    if (!WorthRetrying(status) || stopping_) {
+    if (!WorthRetrying(status) || stopping_ || durability_ == Durability::kScratch) {
       for (Item& item : batch) item.result = status;
       break;
     }

@@ -24,7 +24,8 @@ class Writer {
   using Work = std::function<absl::Status(Tables&)>;      // may run several times; changes nothing but the tables
   using Done = std::function<void(const absl::Status&)>;  // on the writer's thread, once, after the commit
 
-  explicit Writer(std::unique_ptr<Tables> tables);
+  // While the disk refuses, a safe writer waits and tries again; one for scratch gives up what it was asked to write.
+  explicit Writer(std::unique_ptr<Tables> tables, Durability durability = Durability::kSafe);
   // Writes what was submitted (unless the disk refuses), then ends the thread.
   ~Writer();
 
@@ -52,6 +53,7 @@ class Writer {
   absl::Status TryBatch(std::vector<Item>& batch);
 
   std::unique_ptr<Tables> tables_;
+  const Durability durability_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::vector<Item> queue_;

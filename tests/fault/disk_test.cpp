@@ -4,6 +4,8 @@
 
 #include <fstream>
 
+#include "client/local/bake.h"
+#include "tests/support/bake_scene.h"
 #include "tests/support/farm.h"
 #include "tests/support/temp_dir.h"
 
@@ -65,6 +67,20 @@ TEST(FullDisk, JobWaitsForSpaceAndEndsWithTheSameBytes) {
   EXPECT_EQ(ended->state(), v1::DONE) << ended->reason();
   EXPECT_EQ(DigestsOf(*ended), quiet);
   EXPECT_TRUE(std::filesystem::is_empty(options.folder / "incoming"));
+}
+
+// Symptom: a farm waits for space, so a bake with a farm of its own waited for ever.
+TEST(FullDisk, EmbeddedBakeEndsWithAnError) {
+  const SmallDisk disk("300k");
+  ASSERT_TRUE(disk.ok()) << "cannot mount a tmpfs: run this test as root";
+  BakeSettings settings;
+  settings.quality = Quality::kPreview;
+  settings.resolution = 64;
+  SilentProgress progress;
+  const auto summary =
+      Bake({std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb", disk.path() / "out", settings, 1}, progress);
+  EXPECT_EQ(summary.status().code(), absl::StatusCode::kResourceExhausted) << summary.status();
+  EXPECT_TRUE(std::filesystem::is_empty(disk.path()));
 }
 
 }  // namespace

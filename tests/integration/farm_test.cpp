@@ -166,6 +166,7 @@ TEST_F(FarmTest, FailingTaskFailsItsJobWithTheReasonAndNoOther) {
   const v1::Job bad = farm.Bake(scene);
   EXPECT_EQ(bad.state(), v1::FAILED);
   EXPECT_EQ(bad.reason(), "it does not join");
+  EXPECT_EQ(bad.code(), static_cast<int>(absl::StatusCode::kInternal));
   scene.width = 6;
   EXPECT_EQ(farm.Bake(scene).state(), v1::DONE);
 }
@@ -186,6 +187,48 @@ TEST_F(FarmTest, RestartedCoordinatorGoesOnAndWorkersComeBack) {
   EXPECT_EQ(ended->state(), v1::DONE);
   EXPECT_EQ(DigestsOf(*ended), slow_quiet);
   EXPECT_GT(ended->tasks_known(), 0);
+}
+
+TEST_F(FarmTest, CorruptedBlobIsMadeAgain) {
+  Farm farm(FastOptions(dir.path()));
+  const std::string quiet = BakeAlone(scene, 1, false);
+  auto& first = farm.AddWorker("first");
+  first.executor.before = [](const TaskSpec& spec) {
+    return spec.kind == "test/join" ? absl::UnavailableError("not me") : absl::OkStatus();
+  };
+  const auto client = farm.Client();
+  const auto job = client->Submit(scene.Text(), {});
+  ASSERT_TRUE(WaitFor([&] { return client->Get(job->job_id())->tasks_done() == 25; }));
+  // Every blob but the scene rots.
+  for (const auto& file : std::filesystem::recursive_directory_iterator(dir.path() / "blobs")) {
+    if (!file.is_regular_file() || file.path().filename() == Sha256Of(scene.Text()).Hex()) continue;
+    std::ofstream(file.path(), std::ios::in | std::ios::out) << "rot";
+  }
+  farm.StopWorkers();
+  farm.AddWorker("second");
+  const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->state(), v1::DONE) << ended->reason();
+  EXPECT_EQ(DigestsOf(*ended), quiet);
+}
+
+// Symptom: whoever failed a task before a restart is not known after it. It may have the task once more; the job ends
+// well all the same, as its tries are counted anew.
+TEST_F(FarmTest, FailuresBeforeARestartAreForgotten) {
+  Farm farm(FastOptions(dir.path()));
+  auto& bad = farm.AddWorker("bad");
+  bad.executor.before = [](const TaskSpec& spec) {
+    return spec.kind == "test/join" ? absl::UnavailableError("not me") : absl::OkStatus();
+  };
+  const auto client = farm.Client();
+  const auto job = client->Submit(scene.Text(), {});
+  ASSERT_TRUE(WaitFor([&] { return farm.coordinator().GetStats().failed > 0; }));
+  farm.StopCoordinator();
+  farm.StartCoordinator();
+  farm.AddWorker("good");
+  const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->state(), v1::DONE) << ended->reason();
 }
 
 TEST_F(FarmTest, DrainedWorkerFinishesAndLeaves) {

@@ -1,59 +1,23 @@
 // A real level through planner, charts, photons and gather: the same files from one worker and from three.
-#include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
 #include "client/gltf/level.h"
-#include "core/artifact/level_task.h"
 #include "core/scene/canonical.h"
 #include "proto/bakewell/v1/settings.pb.h"
 #include "proto/settings.h"
-#include "server/chart/choose.h"
-#include "server/job/local_runner.h"
 #include "server/plan/level_planner.h"
 #include "tests/support/farm.h"
-#include "tests/support/temp_dir.h"
-#include "worker/level/executor.h"
+#include "tests/support/level_farm.h"
 
 namespace bakewell::test {
 namespace {
 
-absl::StatusOr<std::vector<job::LocalBlob>> RunChart(const TaskSpec& spec, const std::vector<std::string>& inputs) {
-  auto layout = RunChartTask(spec.settings, inputs[0]);
-  if (!layout.ok()) return layout.status();
-  return std::vector<job::LocalBlob>{{"layout", *layout}};
-}
-
-// Bakes on a farm of its own, in this process, over gRPC.
 v1::Job BakeLevel(const std::string& scene, const BakeSettings& settings, int workers) {
-  const TempDir dir("/dev/shm");
-  const plan::LevelPlanner planner;
-  job::Options options;
-  options.folder = dir.path();
-  const auto coordinator = job::Coordinator::Open(options, planner);
-  EXPECT_TRUE(coordinator.ok()) << coordinator.status();
-  const job::LocalRunner local(**coordinator, {{{level_task::kChart.kind, level_task::kChart.code_version}, RunChart}},
-                               1);
-  const auto server = rpc::FarmServer::Start(**coordinator, {});
-  EXPECT_TRUE(server.ok()) << server.status();
-  const auto connection = std::make_shared<Connection>((*server)->InProcessChannel(), "");
-  std::vector<std::unique_ptr<LevelExecutor>> executors;
-  std::vector<std::unique_ptr<Worker>> running;
-  std::vector<std::thread> threads;
-  for (int i = 0; i < workers; ++i) {
-    WorkerOptions worker;
-    worker.identity = {absl::StrCat("w", i), "", 1, int64_t{4} << 30, {}};
-    executors.push_back(std::make_unique<LevelExecutor>());
-    running.push_back(std::make_unique<Worker>(connection, *executors.back(), worker));
-    threads.emplace_back([raw = running.back().get()] { EXPECT_TRUE(raw->Run().ok()); });
-  }
-  FarmClient client(connection);
+  const LevelFarm farm(workers);
+  FarmClient client(farm.Connect());
   const auto submitted = client.Submit(scene, {"", "", ProtoFromSettings(settings).SerializeAsString(), false});
   EXPECT_TRUE(submitted.ok()) << submitted.status();
-  v1::Job ended;
-  if (submitted.ok()) ended = *client.Watch(submitted->job_id(), [](const v1::Job&) { return true; });
-  for (const auto& worker : running) worker->Drain();
-  for (std::thread& thread : threads) thread.join();
-  return ended;
+  return submitted.ok() ? *client.Watch(submitted->job_id(), [](const v1::Job&) { return true; }) : v1::Job();
 }
 
 TEST(LevelFarm, FilesAreTheSameForAnyNumberOfWorkers) {

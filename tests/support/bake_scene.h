@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "client/local/level_bake.h"
+#include "client/local/bake_texels.h"
 #include "core/scene/scene.h"
 
 namespace bakewell {

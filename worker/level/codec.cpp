@@ -1,12 +1,42 @@
 #include "worker/level/codec.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <bit>
+#include <cstring>
 
 #include "core/base/fields.h"
 
 namespace bakewell {
 
 namespace {
+
+// FieldReader for the millions of numbers of these blobs: the same bytes, inline. Numbers past the end are zero.
+static_assert(std::endian::native == std::endian::little);
+class NumberReader {
+ public:
+  explicit NumberReader(std::string_view bytes) : at_(bytes.data()), end_(bytes.data() + bytes.size()) {}
+  template <typename T>
+  T Get() {
+    T value{};
+    ok_ = ok_ && remaining() >= sizeof(T);
+    if (!ok_) return value;
+    std::memcpy(&value, at_, sizeof(T));
+    at_ += sizeof(T);
+    return value;
+  }
+  size_t remaining() const { return static_cast<size_t>(end_ - at_); }
+  bool ok() const { return ok_; }
+  absl::Status Finish(const char* what) const {
+    if (ok_ && at_ == end_) return absl::OkStatus();
+    return absl::DataLossError(absl::StrCat(what, ok_ ? ": bytes left over at the end" : ": ends too early"));
+  }
+
+ private:
+  const char* at_;
+  const char* const end_;
+  bool ok_ = true;
+};
 
 void Put(float value, FieldWriter& writer) { writer.Put(std::bit_cast<uint32_t>(value)); }
 void Put(int64_t value, FieldWriter& writer) { writer.Put(static_cast<uint64_t>(value)); }
@@ -18,15 +48,15 @@ void Put(const std::array<T, kCount>& values, FieldWriter& writer) {
   for (const T& value : values) Put(value, writer);
 }
 
-void Get(FieldReader& reader, float& value) { value = std::bit_cast<float>(reader.Get<uint32_t>()); }
-void Get(FieldReader& reader, int64_t& value) { value = static_cast<int64_t>(reader.Get<uint64_t>()); }
-void Get(FieldReader& reader, Rgb& value) {
+void Get(NumberReader& reader, float& value) { value = reader.Get<float>(); }
+void Get(NumberReader& reader, int64_t& value) { value = reader.Get<int64_t>(); }
+void Get(NumberReader& reader, Rgb& value) {
   Get(reader, value.x);
   Get(reader, value.y);
   Get(reader, value.z);
 }
 template <typename T, size_t kCount>
-void Get(FieldReader& reader, std::array<T, kCount>& values) {
+void Get(NumberReader& reader, std::array<T, kCount>& values) {
   for (T& value : values) Get(reader, value);
 }
 
@@ -42,7 +72,7 @@ void Put(const PhotonTotals& totals, FieldWriter& writer) {
   for (const int64_t value : {totals.rays, totals.deposits, totals.cut_paths}) Put(value, writer);
 }
 
-void AddTotals(FieldReader& reader, PhotonTotals& into) {
+void AddTotals(NumberReader& reader, PhotonTotals& into) {
   PhotonTotals totals;
   Get(reader, totals.emitted);
   Get(reader, totals.absorbed);
@@ -70,7 +100,7 @@ void PutTexel(const TexelLight& light, FieldWriter& writer) {
   writer.Put(static_cast<uint32_t>(light.indirect_samples));
 }
 
-TexelLight GetTexel(FieldReader& reader) {
+TexelLight GetTexel(NumberReader& reader) {
   TexelLight light;
   Get(reader, light.irradiance);
   Get(reader, light.sh.lambda);
@@ -108,7 +138,7 @@ std::string SerializePhotons(const PhotonMap& map) {
 }
 
 absl::Status AddPhotons(std::string_view bytes, PhotonMap& into) {
-  FieldReader reader(bytes);
+  NumberReader reader(bytes);
   AddTotals(reader, into.totals);
   if (reader.Get<uint64_t>() != into.flux.size()) return absl::DataLossError("photons: of other cells");
   while (reader.ok() && reader.remaining() > 0) {
@@ -144,7 +174,7 @@ std::string SerializeCache(const RadianceCache& cache) {
 }
 
 absl::StatusOr<RadianceCache> ParseCache(std::string_view bytes) {
-  FieldReader reader(bytes);
+  NumberReader reader(bytes);
   RadianceCache cache;
   Get(reader, cache.cell_size_m);
   Get(reader, cache.photons_seen);
@@ -164,6 +194,23 @@ absl::StatusOr<RadianceCache> ParseCache(std::string_view bytes) {
   return cache;
 }
 
+GatheredTiles Joined(std::span<const GatheredTiles> parts) {
+  GatheredTiles all;
+  size_t texels = 0;
+  for (const GatheredTiles& part : parts) texels += part.lights.size();
+  all.lights.reserve(texels);
+  for (const GatheredTiles& part : parts) {
+    all.lights.insert(all.lights.end(), part.lights.begin(), part.lights.end());
+    all.counters.gather_rays += part.counters.gather_rays;
+    all.counters.shadow_rays += part.counters.shadow_rays;
+    all.counters.bounce_rays += part.counters.bounce_rays;
+    all.counters.validity_rays += part.counters.validity_rays;
+    all.counters.filter_rays += part.counters.filter_rays;
+    all.counters.bad_samples += part.counters.bad_samples;
+  }
+  return all;
+}
+
 std::string SerializeTiles(const GatheredTiles& tiles) {
   FieldWriter writer;
   const GatherCounters& counters = tiles.counters;
@@ -177,7 +224,7 @@ std::string SerializeTiles(const GatheredTiles& tiles) {
 }
 
 absl::StatusOr<GatheredTiles> ParseTiles(std::string_view bytes) {
-  FieldReader reader(bytes);
+  NumberReader reader(bytes);
   GatheredTiles tiles;
   GatherCounters& counters = tiles.counters;
   for (int64_t* value : {&counters.gather_rays, &counters.shadow_rays, &counters.bounce_rays, &counters.validity_rays,

@@ -26,6 +26,8 @@ struct GatheredTiles {
   std::vector<TexelLight> lights;
   GatherCounters counters;
 };
+// Tiles one after the other.
+GatheredTiles Joined(std::span<const GatheredTiles> parts);
 std::string SerializeTiles(const GatheredTiles& tiles);
 absl::StatusOr<GatheredTiles> ParseTiles(std::string_view bytes);
 

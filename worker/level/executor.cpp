@@ -2,14 +2,15 @@
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <tbb/parallel_for.h>
 
-#include "core/artifact/json_line.h"
 #include "core/atlas/serialize.h"
 #include "core/scene/canonical.h"
 #include "proto/settings.h"
 #include "worker/finish/filter.h"
 #include "worker/level/codec.h"
 #include "worker/level/page_files.h"
+#include "worker/level/report.h"
 #include "worker/trace/float_mode.h"
 
 namespace bakewell {
@@ -18,15 +19,17 @@ namespace {
 
 using level_task::KindName;
 
-constexpr double kMostBadSamples = 1e-6;  // share of NaN or infinite samples above which a bake fails
-
 // Cancels what runs when the lease is not wanted any more.
 class StopProgress final : public Progress {
  public:
-  explicit StopProgress(const std::stop_token& stop) : callback_(stop, [this] { Cancel(); }) {}
-  void Report(std::string_view, int64_t, int64_t) override {}
+  StopProgress(const std::stop_token& stop, Progress* listener)
+      : listener_(listener), callback_(stop, [this] { Cancel(); }) {}
+  void Report(std::string_view phase, int64_t done, int64_t total) override {
+    if (listener_ != nullptr) listener_->Report(phase, done, total);
+  }
 
  private:
+  Progress* const listener_;
   std::stop_callback<std::function<void()>> callback_;
 };
 
@@ -66,11 +69,33 @@ std::string LevelSettings(const BakeSettings& settings) {
 
 }  // namespace
 
+LevelExecutor::LevelExecutor(const LevelExecutorOptions& options) : options_(options) {
+  if (options_.threads > 1) arena_ = std::make_unique<tbb::task_arena>(options_.threads);
+}
+
+void LevelExecutor::Say(std::string_view phase, int64_t done, int64_t total) const {
+  if (options_.progress != nullptr) options_.progress->Report(phase, done, total);
+}
+
+void LevelExecutor::InArena(const std::function<void()>& work) { arena_ ? arena_->execute(work) : work(); }
+
+void LevelExecutor::ForEach(int count, const std::function<void(int)>& body) {
+  if (!arena_) {
+    for (int i = 0; i < count; ++i) body(i);
+    return;
+  }
+  arena_->execute([&] {
+    tbb::parallel_for(0, count, [&](int i) {
+      const FlushDenormals mode;
+      body(i);
+    });
+  });
+}
+
 std::vector<TaskKind> LevelExecutor::Kinds() const {
   std::vector<TaskKind> kinds;
-  for (const KindName& name : {level_task::kSurvey, level_task::kEmit, level_task::kDensity, level_task::kGather,
-                               level_task::kFinish, level_task::kReport}) {
-    kinds.push_back({name.kind, name.code_version});
+  for (const KindName& name : level_task::kAll) {
+    if (name.kind != std::string_view(level_task::kChart.kind)) kinds.push_back({name.kind, name.code_version});
   }
   return kinds;
 }
@@ -106,11 +131,13 @@ absl::StatusOr<std::shared_ptr<const PhotonStage>> LevelExecutor::PhotonStageOf(
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
+  Say("texels", 0, 1);
   BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
   const TexelMap& map = level->texels;
   level_task::Survey survey;
   survey.texels = map.texels.size();
   survey.photons = static_cast<uint64_t>(level->photons);
+  survey.overlapping_texels = static_cast<uint64_t>(map.overlapping_texels);
   survey.tile_end_of_page.assign(map.pages.size(), 0);
   for (int tile = 0; tile < map.tile_count(); ++tile) {
     const uint32_t begin = map.tile_begin[tile], end = map.tile_begin[tile + 1];
@@ -121,30 +148,41 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
   for (size_t page = 1; page < survey.tile_end_of_page.size(); ++page) {
     survey.tile_end_of_page[page] = std::max(survey.tile_end_of_page[page], survey.tile_end_of_page[page - 1]);
   }
+  Say("texels", 1, 1);
   return MadeOutputs{{"survey", level_task::Serialize(survey)}};
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Emit(const Work& work) {
   BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
+  Say("photons", photons_done_, std::max<int64_t>(1, level->photons));
   BAKEWELL_ASSIGN_OR_RETURN(const auto stage, PhotonStageOf(work, *level));
-  StopProgress progress(work.stop);
+  StopProgress progress(work.stop, nullptr);
   PhotonMap map;
   map.flux.resize(2 * stage->cells.cells().size());
-  const int64_t photons = stage->plan.photons, batch = work.range.begin, batches = std::max(1U, work.range.end);
-  EmitPhotons(*level->world, *level->lights, stage->guide, stage->cells, stage->plan, photons * batch / batches,
-              photons * (batch + 1) / batches, progress, map);
+  // Batches of batches, for the threads: they add to one map.
+  const int64_t photons = stage->plan.photons, parts = arena_ ? 4 * int64_t{options_.threads} : 1;
+  const int64_t first = parts * work.range.begin, all = parts * std::max(1U, work.range.end);
+  ForEach(static_cast<int>(parts), [&](int part) {
+    const int64_t begin = photons * (first + part) / all, end = photons * (first + part + 1) / all;
+    EmitPhotons(*level->world, *level->lights, stage->guide, stage->cells, stage->plan, begin, end, progress, map);
+    Say("photons", photons_done_ += end - begin, photons);
+  });
   return MadeOutputs{{"flux", SerializePhotons(map)}};
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Density(const Work& work) {
   BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
   BAKEWELL_ASSIGN_OR_RETURN(const auto stage, PhotonStageOf(work, *level));
-  StopProgress progress(work.stop);
+  StopProgress progress(work.stop, options_.progress);
+  progress.Report("density", 0, 2);
   PhotonMap map;
   map.flux.resize(2 * stage->cells.cells().size());
   for (const Blob& flux : InputsNamed(work.inputs, "flux")) BAKEWELL_RETURN_IF_ERROR(AddPhotons(*flux, map));
-  const RadianceCache cache = EstimateDensity(*level->world, stage->cells, map, stage->plan, {}, progress);
-  return MadeOutputs{{"cache", SerializeCache(cache)}};
+  RadianceCache cache;
+  InArena([&] { cache = EstimateDensity(*level->world, stage->cells, map, stage->plan, {}, progress); });
+  const level_task::PhotonCounts totals{stage->plan.photons, map.totals.rays, cache.rays,
+                                        std::ssize(stage->cells.cells())};
+  return MadeOutputs{{"cache", SerializeCache(cache)}, {"totals", level_task::Serialize(totals)}};
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
@@ -165,68 +203,60 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
   const GatherScene scene{*level->world, *level->lights, tree, stage->cells, photons->cache};
   GatherOptions options = BudgetOf(work.settings, level->texels).gather;
   options.mean_irradiance = photons->mean_irradiance;
-  GatheredTiles tiles;
-  const uint32_t end = std::min(work.range.end, static_cast<uint32_t>(level->texels.tile_count()));
-  for (uint32_t tile = work.range.begin; tile < end; ++tile) {
-    if (work.stop.stop_requested()) return absl::CancelledError("stopped");
-    const auto lights =
-        GatherTile(scene, level->layout, level->texels, static_cast<int>(tile), options, tiles.counters);
-    tiles.lights.insert(tiles.lights.end(), lights.begin(), lights.end());
-  }
-  return MadeOutputs{{"lights", SerializeTiles(tiles)}};
+  const int all = level->texels.tile_count(), end = static_cast<int>(std::min<int64_t>(work.range.end, all));
+  const int begin = static_cast<int>(std::min<int64_t>(work.range.begin, end));
+  std::vector<GatheredTiles> made(static_cast<size_t>(end - begin));
+  ForEach(end - begin, [&](int i) {
+    if (work.stop.stop_requested()) return;
+    made[i].lights = GatherTile(scene, level->layout, level->texels, begin + i, options, made[i].counters);
+    Say("gather", ++tiles_done_, all);
+  });
+  if (work.stop.stop_requested()) return absl::CancelledError("stopped");
+  return MadeOutputs{{"lights", SerializeTiles(Joined(made))}};
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
   BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
+  Say("finish", pages_done_, std::ssize(level->texels.pages));
   // The tasks' tiles are consecutive; range.end says with which tile they begin.
   std::vector<TexelLight> lights(level->texels.texels.size());
   if (work.range.end > static_cast<uint32_t>(level->texels.tile_count())) {
     return absl::InvalidArgumentError("a page begins behind the last tile");
   }
-  size_t next = level->texels.tile_begin[work.range.end];
+  const int page = static_cast<int>(work.range.begin);
+  if (page >= static_cast<int>(level->texels.pages.size())) return absl::InvalidArgumentError("no such page");
+  BakeTally tally;
+  const size_t first = level->texels.tile_begin[work.range.end];
+  size_t next = first;
   for (const Blob& blob : InputsNamed(work.inputs, "lights")) {
     BAKEWELL_ASSIGN_OR_RETURN(const GatheredTiles tiles, ParseTiles(*blob));
     if (tiles.lights.size() > lights.size() - next) return absl::InvalidArgumentError("more texels than the level has");
     std::copy(tiles.lights.begin(), tiles.lights.end(), lights.begin() + static_cast<ptrdiff_t>(next));
     next += tiles.lights.size();
+    tally.Count(tiles.counters);
   }
-  const int page = static_cast<int>(work.range.begin);
   FilterCounters filtered;
-  if (page >= static_cast<int>(level->texels.pages.size())) return absl::InvalidArgumentError("no such page");
-  if (Filters(work.settings)) FilterPage(level->texels, page, lights, filtered);
-  return PageFiles(level->texels, lights, page);
+  if (Filters(work.settings)) InArena([&] { FilterPage(level->texels, page, lights, filtered); });
+  tally.Count(std::span(lights).subspan(first, next - first), filtered);
+  BAKEWELL_ASSIGN_OR_RETURN(MadeOutputs outputs, PageFiles(level->texels, lights, page));
+  outputs.push_back({"tally", tally.Serialize()});
+  Say("finish", ++pages_done_, std::ssize(level->texels.pages));
+  return outputs;
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Report(const Work& work) {
-  GatherCounters sum;
-  int64_t texels = 0, invalid = 0;
-  for (const Blob& blob : InputsNamed(work.inputs, "lights")) {
-    BAKEWELL_ASSIGN_OR_RETURN(const GatheredTiles tiles, ParseTiles(*blob));
-    sum.gather_rays += tiles.counters.gather_rays;
-    sum.shadow_rays += tiles.counters.shadow_rays;
-    sum.bounce_rays += tiles.counters.bounce_rays;
-    sum.validity_rays += tiles.counters.validity_rays;
-    sum.filter_rays += tiles.counters.filter_rays;
-    sum.bad_samples += tiles.counters.bad_samples;
-    texels += std::ssize(tiles.lights);
-    for (const TexelLight& light : tiles.lights) invalid += light.valid ? 0 : 1;
+  BAKEWELL_ASSIGN_OR_RETURN(const Blob survey_bytes, FindInput(work.inputs, "survey"));
+  BAKEWELL_ASSIGN_OR_RETURN(const level_task::Survey survey, level_task::ParseSurvey(*survey_bytes));
+  BAKEWELL_ASSIGN_OR_RETURN(const Blob totals_bytes, FindInput(work.inputs, "totals"));
+  BAKEWELL_ASSIGN_OR_RETURN(const level_task::PhotonCounts photons, level_task::ParsePhotonCounts(*totals_bytes));
+  BakeTally tally;
+  for (const Blob& blob : InputsNamed(work.inputs, "tally")) {
+    BAKEWELL_ASSIGN_OR_RETURN(const BakeTally page, BakeTally::Parse(*blob));
+    tally.Add(page);
   }
-  if (static_cast<double>(sum.bad_samples) > kMostBadSamples * static_cast<double>(sum.gather_rays + sum.shadow_rays)) {
-    return absl::InvalidArgumentError(absl::StrCat(sum.bad_samples,
-                                                   " samples were NaN or infinite; lights or emission "
-                                                   "of this scene are beyond what float can hold"));
-  }
-  const std::string json = JsonLine()
-                               .Add("texels/covered", texels)
-                               .Add("texels/invalid", invalid)
-                               .Add("gather/rays", sum.gather_rays)
-                               .Add("gather/shadow_rays", sum.shadow_rays)
-                               .Add("gather/bounce_rays", sum.bounce_rays)
-                               .Add("gather/bad_samples", sum.bad_samples)
-                               .Add("filter/rays", sum.filter_rays)
-                               .Add("texels/validity_rays", sum.validity_rays)
-                               .Text();
-  return MadeOutputs{{"statistics.json", json + "\n"}};
+  BAKEWELL_ASSIGN_OR_RETURN(const BakeReport report,
+                            tally.Finish(photons, static_cast<int64_t>(survey.overlapping_texels)));
+  return MadeOutputs{{level_task::kReportArtifact, ReportJson(report)}};
 }
 
 }  // namespace bakewell

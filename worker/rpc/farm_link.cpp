@@ -140,7 +140,7 @@ absl::Status FarmLink::Listen(uint64_t worker_id, int credit, const std::functio
     v1::LeaseResponse response;
     while (stream->calls->Read(&response)) {
       const auto& revoked = response.revoked();
-      take({LeasesFrom(response.leases()), {revoked.begin(), revoked.end()}, response.drain()});
+      take({LeasesFrom(response.leases()), {revoked.begin(), revoked.end()}, response.drain(), response.superseded()});
     }
   }
   {

@@ -38,6 +38,7 @@ struct LeaseNews {
   std::vector<LeasedTask> leases;
   std::vector<uint64_t> revoked;
   bool drain = false;
+  bool superseded = false;  // another stream of this worker took this one's place
 };
 
 class FarmLink {

@@ -24,6 +24,12 @@ TaskOutputs DescriptionOf(const MadeOutputs& made) {
   return outputs;
 }
 
+std::vector<Blob> BlobsOf(MadeOutputs made) {
+  std::vector<Blob> blobs;
+  for (MadeOutput& output : made) blobs.push_back(std::make_shared<const std::string>(std::move(output.bytes)));
+  return blobs;
+}
+
 bool IsFinal(const absl::Status& status) {
   return status.ok() || absl::IsAborted(status) || absl::IsInvalidArgument(status) || absl::IsUnauthenticated(status) ||
          absl::IsPermissionDenied(status);
@@ -187,13 +193,13 @@ void Worker::UploadLoop() {
   }
 }
 
-absl::Status Worker::TryDeliver(const TaskPtr& task, const TaskOutputs& outputs) {
+absl::Status Worker::TryDeliver(const TaskPtr& task, const TaskOutputs& outputs, const std::vector<Blob>& blobs) {
   std::vector<Digest> digests;
   for (const TaskOutput& output : outputs) digests.push_back(output.digest);
   BAKEWELL_ASSIGN_OR_RETURN(const std::vector<Digest> missing, FindMissing(link_.connection(), digests));
   for (const Digest& digest : missing) {
     const auto index = std::find(digests.begin(), digests.end(), digest) - digests.begin();
-    const std::string& bytes = task->made[static_cast<size_t>(index)].bytes;
+    const std::string& bytes = *blobs[static_cast<size_t>(index)];
     BAKEWELL_RETURN_IF_ERROR(UploadBlob(link_.connection(), digest, bytes));
     const std::lock_guard lock(mutex_);
     counters_.uploaded_bytes += std::ssize(bytes);
@@ -209,13 +215,17 @@ absl::Status Worker::TryDeliver(const TaskPtr& task, const TaskOutputs& outputs)
 // Sends the result until it is acknowledged: work that was done is not lost to a restart of the coordinator.
 void Worker::Deliver(const TaskPtr& task) {
   const TaskOutputs outputs = DescriptionOf(task->made);
+  const std::vector<Blob> blobs = BlobsOf(std::move(task->made));
+  // Before anybody hears of the result: the task that needs it may be leased to this worker at once.
+  for (size_t i = 0; i < outputs.size(); ++i) cache_.Put(outputs[i].digest, blobs[i]);
   auto pause = std::chrono::milliseconds(50);
   for (;;) {
-    const absl::Status status = TryDeliver(task, outputs);
+    const absl::Status status = TryDeliver(task, outputs, blobs);
     if (IsFinal(status)) {
       if (!status.ok()) options_.log(absl::StrCat("result refused: ", status.ToString()));
       break;
     }
+    if (options_.undelivered) options_.undelivered(status);
     Pause(pause);
     pause = std::min(pause * 2, std::chrono::milliseconds(2000));
     const std::lock_guard lock(mutex_);
@@ -224,9 +234,6 @@ void Worker::Deliver(const TaskPtr& task) {
   {
     const std::lock_guard lock(mutex_);
     ++counters_.done;
-  }
-  for (size_t i = 0; i < outputs.size(); ++i) {
-    cache_.Put(outputs[i].digest, std::make_shared<const std::string>(std::move(task->made[i].bytes)));
   }
   Forget(task);
 }

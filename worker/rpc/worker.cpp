@@ -124,6 +124,7 @@ void Worker::Take(LeaseNews news) {
     queue_.push_back(task);
   }
   for (const uint64_t token : news.revoked) Revoke(token);
+  if (news.superseded) link_.HangUp();  // and connects again
   if (news.drain && !draining_) {
     draining_ = true;
     drain_at_ = Clock::now();
@@ -167,7 +168,11 @@ absl::Status Worker::Session() {
 absl::Status Worker::Run() {
   // Leaving is decided beside the stream, which only ends when somebody hangs up.
   std::thread leaver([this] {
-    while (!ShouldLeave()) Pause(std::chrono::milliseconds(50));
+    while (!ShouldLeave()) {
+      std::unique_lock lock(mutex_);
+      changed_.wait_for(lock, std::chrono::milliseconds(50),
+                        [this] { return ended_ || (draining_ && tasks_.empty()); });
+    }
     link_.HangUp();
   });
   absl::Status refusal;

@@ -28,6 +28,8 @@ struct WorkerOptions {
   std::chrono::milliseconds idle_exit{0};  // leave after this long without a task; 0: never
   std::chrono::milliseconds grace{30000};  // of a drain: what runs longer goes back
   std::function<void(std::string_view)> log;
+  // Called when a result could not be delivered; it is tried again.
+  std::function<void(const absl::Status&)> undelivered;
 };
 
 struct WorkerCounters {
@@ -84,7 +86,7 @@ class Worker {
   void Report(const TaskPtr& task, const absl::Status& status, const std::vector<Digest>& missing);
   void Refill();
   void Deliver(const TaskPtr& task);
-  absl::Status TryDeliver(const TaskPtr& task, const TaskOutputs& outputs);
+  absl::Status TryDeliver(const TaskPtr& task, const TaskOutputs& outputs, const std::vector<Blob>& blobs);
   bool ShouldLeave();
   void GiveBackQueued();
   void Leave();

@@ -6,7 +6,7 @@
 #include <iostream>
 #include <random>
 
-#include "client/local/level_bake.h"
+#include "client/local/bake_texels.h"
 #include "worker/finish/page.h"
 
 // bench_density LEVEL TEXELS_PER_METRE: the error of a lightmap with uniform and with signal-driven density, measured

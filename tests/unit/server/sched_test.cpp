@@ -195,12 +195,48 @@ TEST_F(SchedulerTest, ThreeFailuresEndTheJob) {
   EXPECT_EQ(Count(Event::Kind::kJobFailed), 1);
 }
 
-TEST_F(SchedulerTest, LoneWorkerMayTryAgain) {
+TEST_F(SchedulerTest, LoneWorkerMayTryAgainAfterAPauseThatDoubles) {
   scheduler.AddWorker(kAnn, {1, INT64_MAX}, now);
   scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
   const TaskId task = Add(kJob);
-  scheduler.Fail(task, One(kAnn).token, FailureKind::kRetry, now);
+  for (const Time pause : {seconds(1), seconds(2), seconds(4)}) {
+    scheduler.Fail(task, One(kAnn).token, FailureKind::kRetry, now);
+    now += pause - milliseconds(1);
+    EXPECT_TRUE(None(kAnn));
+    now += milliseconds(1);
+  }
   EXPECT_EQ(One(kAnn).task, task);
+  scheduler.CheckConsistent();
+}
+
+// Symptom: one worker that failed a task three times in a row had used up the task's tries, though others came later.
+TEST_F(SchedulerTest, RepeatedFailuresOfOneWorkerCountOnce) {
+  scheduler.AddWorker(kAnn, {1, INT64_MAX}, now);
+  scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
+  const TaskId task = Add(kJob);
+  for (int i = 0; i < 5; ++i) {
+    scheduler.Fail(task, One(kAnn).token, FailureKind::kRetry, now);
+    now += seconds(64);
+    scheduler.Heartbeat(kAnn, now);
+  }
+  EXPECT_EQ(Count(Event::Kind::kJobFailed), 0);
+  scheduler.AddWorker(kBob, {1, INT64_MAX}, now);
+  EXPECT_TRUE(None(kAnn));
+  scheduler.Complete(task, One(kBob).token, now);
+  EXPECT_EQ(Count(Event::Kind::kJobDone), 1);
+}
+
+TEST_F(SchedulerTest, TaskThatTheOnlyWorkerNeverManagesEndsTheJobAfterTenTries) {
+  scheduler.AddWorker(kAnn, {1, INT64_MAX}, now);
+  scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
+  const TaskId task = Add(kJob);
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(Count(Event::Kind::kJobFailed), 0);
+    scheduler.Fail(task, One(kAnn).token, FailureKind::kRetry, now);
+    now += seconds(700);  // also what five failures in a row cost the worker
+    scheduler.Heartbeat(kAnn, now);
+  }
+  EXPECT_EQ(Count(Event::Kind::kJobFailed), 1);
 }
 
 TEST_F(SchedulerTest, PermanentFailureEndsTheJobAtOnce) {

@@ -57,6 +57,31 @@ TEST_F(StoreTest, NewerDatabaseIsRefusedAndUntouched) {
   EXPECT_EQ(after.execAndGet("PRAGMA user_version").getInt(), 99);
 }
 
+TEST_F(StoreTest, DatabaseOfTheFirstSchemaIsMigratedWithItsRows) {
+  {
+    std::ifstream file(std::string(BAKEWELL_SOURCE_DIR) + "/schema/0001_farm.sql");
+    const std::string sql(std::istreambuf_iterator<char>(file), {});
+    SQLite::Database old(dir.path() / "farm.db", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    old.exec(sql);
+    old.exec(
+        "INSERT INTO job(user,client_key,name,state,priority,scene,settings,submitted_us,reason) "
+        "VALUES('ann','key','level',2,0,x'','',5,'it burnt')");
+    old.exec("PRAGMA user_version=1");
+  }
+  OpenAll();
+  std::optional<JobRow> job;
+  ASSERT_TRUE(writer
+                  ->Run([&](Tables& tables) {
+                    job = *tables.FindJob(1);
+                    return absl::OkStatus();
+                  })
+                  .ok());
+  ASSERT_TRUE(job.has_value());
+  EXPECT_EQ(job->reason, "it burnt");
+  EXPECT_EQ(job->code, 0);
+  EXPECT_TRUE(job->phases.empty());
+}
+
 TEST_F(StoreTest, ForeignFileIsNotADatabase) {
   std::ofstream(dir.path() / "farm.db") << std::string(8192, 'x');
   EXPECT_EQ(OpenDatabase(dir.path() / "farm.db").status().code(), absl::StatusCode::kDataLoss);
@@ -115,26 +140,28 @@ TEST_F(StoreTest, FailedWorkIsUndoneAlone) {
 
 TEST_F(StoreTest, JobRoundTripAndIdempotentKey) {
   OpenAll();
-  JobRow job{0, "ann", "key1", "level", JobState::kRunning, 100, Sha256Of("scene"), "set", 12, 0, "", 5, 2, 0, ""};
-  ASSERT_TRUE(
-      writer
-          ->Run([&](Tables& tables) -> absl::Status {
-            BAKEWELL_ASSIGN_OR_RETURN(job.id, tables.InsertJob(job));
-            EXPECT_EQ(
-                tables.InsertJob(JobRow{0, "ann", "key1", "", {}, 0, {}, "", 0, 0, "", 0, 0, 0, ""}).status().code(),
-                absl::StatusCode::kAlreadyExists);
-            job.state = JobState::kDone;
-            job.finished_us = 99;
-            BAKEWELL_RETURN_IF_ERROR(tables.UpdateJob(job));
-            const auto found = *tables.FindJobByKey("ann", "key1");
-            EXPECT_EQ(found->id, job.id);
-            EXPECT_EQ(found->state, JobState::kDone);
-            EXPECT_EQ(found->scene, Sha256Of("scene"));
-            EXPECT_EQ(tables.ListJobs({"ann", JobState::kDone, INT64_MAX, 10})->size(), 1u);
-            EXPECT_EQ(tables.ListJobs({"bob", {}, INT64_MAX, 10})->size(), 0u);
-            return absl::OkStatus();
-          })
-          .ok());
+  JobRow job{0, "ann", "key1", "level", JobState::kRunning, 100, Sha256Of("scene"), "set", 12, 0, "", 5, 2,
+             0, "",    0,      ""};
+  ASSERT_TRUE(writer
+                  ->Run([&](Tables& tables) -> absl::Status {
+                    BAKEWELL_ASSIGN_OR_RETURN(job.id, tables.InsertJob(job));
+                    EXPECT_EQ(
+                        tables.InsertJob(JobRow{0, "ann", "key1", "", {}, 0, {}, "", 0, 0, "", 0, 0, 0, "", 0, ""})
+                            .status()
+                            .code(),
+                        absl::StatusCode::kAlreadyExists);
+                    job.state = JobState::kDone;
+                    job.finished_us = 99;
+                    BAKEWELL_RETURN_IF_ERROR(tables.UpdateJob(job));
+                    const auto found = *tables.FindJobByKey("ann", "key1");
+                    EXPECT_EQ(found->id, job.id);
+                    EXPECT_EQ(found->state, JobState::kDone);
+                    EXPECT_EQ(found->scene, Sha256Of("scene"));
+                    EXPECT_EQ(tables.ListJobs({"ann", JobState::kDone, INT64_MAX, 10})->size(), 1u);
+                    EXPECT_EQ(tables.ListJobs({"bob", {}, INT64_MAX, 10})->size(), 0u);
+                    return absl::OkStatus();
+                  })
+                  .ok());
 }
 
 TEST_F(StoreTest, EpochRises) {

@@ -1,0 +1,238 @@
+// `bakewell bake`, `bakewell submit --wait` and the bare kernels give the same files.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "client/cli/cli.h"
+#include "client/local/bake.h"
+#include "core/artifact/atomic_file.h"
+#include "tests/support/bake_scene.h"
+#include "tests/support/gltf_builder.h"
+#include "tests/support/level_farm.h"
+#include "tests/support/temp_dir.h"
+#include "worker/level/page_files.h"
+#include "worker/level/report.h"
+
+namespace bakewell::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+const std::string kSample = std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb";
+
+BakeSettings SmallSettings() {
+  BakeSettings settings;
+  settings.quality = Quality::kPreview;
+  settings.resolution = 64;
+  return settings;
+}
+
+std::set<std::string> NamesIn(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+  return names;
+}
+
+std::string BytesOf(const fs::path& path) { return ReadWholeFile(path).value(); }
+
+// A manifest without what differs from run to run.
+Json TimelessManifest(const fs::path& folder) {
+  Json manifest = Json::parse(BytesOf(folder / "manifest.json"));
+  Json& statistics = manifest["statistics"];
+  EXPECT_TRUE(statistics["cpu_seconds"].is_number());
+  for (const char* name : {"wall_seconds", "cpu_seconds", "phases"}) statistics.erase(name);
+  return manifest;
+}
+
+struct Outcome {
+  int exit_code = 0;
+  std::string out, err;
+};
+Outcome RunWith(const std::vector<std::string>& words) {
+  std::vector<const char*> argv = {"bakewell"};
+  for (const std::string& word : words) argv.push_back(word.c_str());
+  std::ostringstream out, err;
+  const int exit_code =
+      RunCli(static_cast<int>(argv.size()), argv.data(), {out, err}, Bakers{Bake, BakeReference, Unwrap});
+  return {exit_code, out.str(), err.str()};
+}
+
+void ExpectTheBytesOfTheBareKernels(const BakeSettings& settings) {
+  const TempDir dir;
+  SilentProgress progress;
+  const auto summary = Bake({kSample, dir.path() / "out", settings, 2}, progress);
+  ASSERT_TRUE(summary.ok()) << summary.status();
+
+  PhaseClock clock;
+  const auto prepared = PrepareLevel(LoadLevel(kSample).value(), settings, clock, progress);
+  ASSERT_TRUE(prepared.ok()) << prepared.status();
+  const auto baked = BakeTexels(*prepared, settings, clock, progress);
+  ASSERT_TRUE(baked.ok()) << baked.status();
+  BakeTally tally;
+  tally.Count(baked->counters);
+  for (int page = 0; page < static_cast<int>(prepared->texels.pages.size()); ++page) {
+    std::vector<TexelLight> lights;
+    for (size_t i = 0; i < baked->lights.size(); ++i) {
+      if (prepared->texels.texels[i].page == page) lights.push_back(baked->lights[i]);
+    }
+    BakeTally of_page;
+    of_page.Count(lights, page == 0 ? baked->filter : FilterCounters());
+    tally.Add(of_page);
+    const auto files = PageFiles(prepared->texels, baked->lights, page);
+    ASSERT_TRUE(files.ok()) << files.status();
+    for (const MadeOutput& file : *files) {
+      EXPECT_TRUE(BytesOf(dir.path() / "out" / file.name) == file.bytes) << file.name;
+    }
+  }
+
+  const auto report = tally.Finish({baked->photons, baked->photon_rays, baked->density_rays, baked->cells}, 0);
+  ASSERT_TRUE(report.ok()) << report.status();
+  const Json statistics = TimelessManifest(dir.path() / "out")["statistics"];
+  EXPECT_EQ(statistics["counters"].get<decltype(report->counters)>(), report->counters);
+  EXPECT_EQ(statistics["estimated_error"], report->estimated_error);
+  EXPECT_EQ(statistics["photons"], report->photons);
+  EXPECT_EQ(statistics["rays"], report->rays);
+}
+
+TEST(EmbeddedBake, GivesTheBytesOfTheBareKernels) {
+  ExpectTheBytesOfTheBareKernels(SmallSettings());
+  BakeSettings unfiltered = SmallSettings();
+  unfiltered.filter = false;
+  ExpectTheBytesOfTheBareKernels(unfiltered);
+}
+
+TEST(EmbeddedBake, GivesTheBytesOfTheBareKernelsAfterAPreviewOfTheLight) {
+  BakeSettings settings = SmallSettings();
+  settings.uv = UvMode::kGenerate;
+  settings.density = DensityMode::kSignal;
+  ExpectTheBytesOfTheBareKernels(settings);
+}
+
+TEST(EmbeddedBake, PhasesComeInOrderAndNothingElseIsLeftBehind) {
+  const TempDir dir;
+  struct Listener : Progress {
+    std::mutex mutex;
+    std::vector<std::string> seen;
+    void Report(std::string_view phase, int64_t, int64_t) override {
+      const std::lock_guard lock(mutex);
+      if (seen.empty() || seen.back() != phase) seen.emplace_back(phase);
+    }
+  } progress;
+  ASSERT_TRUE(Bake({kSample, dir.path(), SmallSettings(), 1}, progress).ok());
+  EXPECT_EQ(progress.seen, (std::vector<std::string>{"chart", "texels", "photons", "density", "gather", "finish"}));
+  const Json manifest = Json::parse(BytesOf(dir.path() / "manifest.json"));
+  std::set<std::string> listed = {"manifest.json"};
+  for (const Json& file : manifest["files"]) listed.insert(file["name"].get<std::string>());
+  EXPECT_EQ(NamesIn(dir.path()), listed);
+  std::vector<std::string> timed;
+  for (const Json& phase : manifest["statistics"]["phases"]) timed.push_back(phase["phase"]);
+  EXPECT_EQ(timed,
+            (std::vector<std::string>{"load", "chart", "texels", "photons", "density", "gather", "finish", "write"}));
+  EXPECT_GT(manifest["task_versions"].size(), 5u);
+}
+
+TEST(EmbeddedBake, CancelledBakeLeavesTheFolderAsItWas) {
+  const TempDir dir;
+  struct Impatient : Progress {
+    void Report(std::string_view phase, int64_t, int64_t) override {
+      if (phase == "gather") Cancel();
+    }
+  } progress;
+  BakeSettings settings = SmallSettings();
+  settings.quality = Quality::kHigh;
+  settings.resolution = 256;
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(Bake({kSample, dir.path() / "out", settings, 2}, progress).status().code(), absl::StatusCode::kCancelled);
+  // The whole bake takes half a minute.
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  EXPECT_TRUE(NamesIn(dir.path()).empty());
+}
+
+TEST(EmbeddedBake, SceneWithoutTexelsIsTheUsersErrorAndNamed) {
+  const TempDir dir;
+  GltfBuilder builder = QuadGltf();
+  builder.json["nodes"][0]["extras"]["lightmapped"] = false;
+  const fs::path scene = builder.Write(dir.path() / "dark.glb");
+  const Outcome run = RunWith({"bake", scene.string(), "-o", (dir.path() / "out").string()});
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_NE(run.err.find(scene.string() + ": no lightmapped surface"), std::string::npos) << run.err;
+  EXPECT_FALSE(fs::exists(dir.path() / "out"));
+}
+
+TEST(SubmitWait, GivesWhatBakeGives) {
+  const TempDir dir;
+  const LevelFarm farm(2);
+  const std::string baked = dir.path() / "baked", fetched = dir.path() / "fetched";
+  const std::vector<std::string> flags = {"--quality", "preview",       "--resolution",
+                                          "64",        "--environment", "constant:0.1,0.2,0.3"};
+  std::vector<std::string> bake = {"bake", kSample, "-o", baked};
+  std::vector<std::string> submit = {"submit", kSample, "--wait", "--server", farm.address(), "-o", fetched};
+  bake.insert(bake.end(), flags.begin(), flags.end());
+  submit.insert(submit.end(), flags.begin(), flags.end());
+  const Outcome one = RunWith(bake), other = RunWith(submit);
+  ASSERT_EQ(one.exit_code, 0) << one.err;
+  ASSERT_EQ(other.exit_code, 0) << other.err;
+  EXPECT_EQ(NamesIn(fetched), NamesIn(baked));
+  for (const std::string& name : NamesIn(baked)) {
+    if (name == "manifest.json") continue;
+    EXPECT_TRUE(BytesOf(fs::path(baked) / name) == BytesOf(fs::path(fetched) / name)) << name;
+  }
+  EXPECT_EQ(TimelessManifest(fetched), TimelessManifest(baked));
+  const Json phases = Json::parse(BytesOf(fs::path(fetched) / "manifest.json"))["statistics"]["phases"];
+  ASSERT_EQ(phases.size(), 6u);
+  EXPECT_EQ(phases[4]["phase"], "gather");
+  EXPECT_GT(phases[4]["cpu_seconds"], 0);
+  EXPECT_GT(phases[4]["wall_seconds"], 0);
+}
+
+TEST(SubmitWait, FailedJobHasTheExitCodeAndTheReasonOfBake) {
+  const TempDir dir;
+  const LevelFarm farm(1);
+  GltfBuilder builder = QuadGltf();
+  builder.json["nodes"][0]["extras"]["lightmapped"] = false;
+  const fs::path scene = builder.Write(dir.path() / "dark.glb");
+  const Outcome run =
+      RunWith({"submit", scene.string(), "--wait", "--server", farm.address(), "-o", (dir.path() / "out").string()});
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_NE(run.err.find(scene.string() + ": no lightmapped surface"), std::string::npos) << run.err;
+}
+
+TEST(AdminCommand, DoesWhatAnOperatorDoes) {
+  const TempDir dir;
+  LevelFarm farm(1);
+  const auto admin = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "admin");
+    words.insert(words.end(), {"--server", farm.address()});
+    return RunWith(words);
+  };
+  Outcome run = admin({"status", "--json"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(Json::parse(run.out)["running_jobs"], 0);
+  EXPECT_EQ(admin({"quota", "local", "--max-jobs", "1"}).exit_code, 0);
+  EXPECT_EQ(admin({"quota", "local", "--weight", "0"}).exit_code, 2);
+  EXPECT_EQ(admin({"priority", "99", "7"}).exit_code, 2);
+  const std::vector<std::string> submit = {"submit", kSample, "--server", farm.address(), "--json"};
+  run = RunWith(submit);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const int64_t job = Json::parse(run.out)["job"];
+  EXPECT_EQ(RunWith(submit).exit_code, 1) << "the quota is one job";
+  EXPECT_EQ(admin({"priority", std::to_string(job), "7"}).exit_code, 0);
+  FarmClient client(farm.Connect());
+  EXPECT_EQ(client.Get(job)->priority(), 7);
+  EXPECT_TRUE(client.Cancel(job).ok());
+  EXPECT_NE(admin({"gc", "--target", "0", "--grace", "0.000001"}).out.find("results forgotten"), std::string::npos);
+  const auto workers = client.Workers();
+  ASSERT_TRUE(workers.ok()) << workers.status();
+  for (const v1::WorkerState& worker : workers->workers()) {
+    if (worker.name() != "w0") continue;
+    EXPECT_EQ(admin({"drain", std::to_string(worker.id())}).exit_code, 0);
+  }
+  EXPECT_EQ(admin({"drain", "1"}).exit_code, 2);
+  EXPECT_EQ(admin({}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace bakewell::test

@@ -1,0 +1,363 @@
+// A client that means harm: the service refuses, says so once, and goes on.
+#include <absl/strings/str_cat.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/scene/canonical.h"
+#include "proto/bakewell/v1/admin.pb.h"
+#include "proto/bakewell/v1/bake.grpc.pb.h"
+#include "proto/bakewell/v1/blob.grpc.pb.h"
+#include "proto/bakewell/v1/settings.pb.h"
+#include "proto/bakewell/v1/worker.pb.h"
+#include "proto/rpc/transfer.h"
+#include "proto/settings.h"
+#include "server/plan/level_planner.h"
+#include "server/rpc/refusal_log.h"
+#include "tests/support/farm.h"
+#include "tests/support/temp_dir.h"
+
+namespace bakewell::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+class HostileTest : public testing::Test {
+ protected:
+  Farm::Options OptionsHere() {
+    Farm::Options options;
+    options.folder = dir.path() / "farm";
+    options.job.log = [this](std::string_view line) {
+      const std::lock_guard lock(mutex);
+      log.emplace_back(line);
+    };
+    return options;
+  }
+  int64_t LinesWith(const std::string& text) {
+    const std::lock_guard lock(mutex);
+    return std::count_if(log.begin(), log.end(),
+                         [&](const std::string& line) { return line.find(text) != std::string::npos; });
+  }
+
+  TempDir dir{"/dev/shm"};
+  SyntheticScene scene{4, 2, 1000, 0, 64, 1, true};
+  std::mutex mutex;
+  std::vector<std::string> log;
+};
+
+// A method, and a message that it would take.
+struct Target {
+  std::string method, valid;
+};
+
+std::vector<Target> Targets(const Digest& scene) {
+  const std::string digest = DigestToBytes(scene);
+  v1::FindMissingRequest find;
+  find.add_digests(digest);
+  v1::UploadRequest upload;
+  upload.set_digest(digest);
+  upload.set_size_bytes(10);
+  upload.set_data("0123456789");
+  v1::DownloadRequest download;
+  download.set_digest(digest);
+  v1::SubmitRequest submit;
+  submit.set_client_key("key");
+  submit.set_scene(digest);
+  v1::GetRequest get;
+  get.set_job_id(1);
+  v1::ListRequest list;
+  list.set_page_size(10);
+  list.set_page_token("5");
+  v1::WatchRequest watch;
+  watch.set_job_id(1);
+  v1::CancelRequest cancel;
+  cancel.set_job_id(1);
+  v1::FetchRequest fetch;
+  fetch.set_job_id(1);
+  fetch.set_name("out");
+  v1::RegisterRequest enroll;
+  enroll.set_name("worker");
+  enroll.set_cores(1);
+  enroll.set_memory_bytes(1 << 20);
+  enroll.add_capabilities()->set_kind("test/other");
+  enroll.add_held()->set_key(digest);
+  v1::LeaseRequest lease;
+  lease.set_worker_id(4294967297);
+  lease.set_add_credit(5);
+  v1::HeartbeatRequest beat;
+  beat.set_worker_id(4294967297);
+  v1::CompleteRequest complete;
+  complete.set_key(digest);
+  complete.set_token(4294967297);
+  v1::TaskOutput& output = *complete.add_outputs();
+  output.set_name("out");
+  output.set_digest(digest);
+  output.set_size_bytes(20);
+  v1::FailRequest fail;
+  fail.set_key(digest);
+  fail.set_code(13);
+  fail.add_missing_inputs(digest);
+  v1::ReleaseRequest release;
+  release.add_leases()->set_key(digest);
+  v1::DrainRequest drain;
+  drain.set_worker_id(7);
+  v1::SetPriorityRequest priority;
+  priority.set_job_id(99);
+  v1::SetQuotaRequest quota;
+  quota.set_user("nobody");
+  quota.set_weight(1);
+  v1::CollectGarbageRequest collect;
+  collect.set_target_bytes(1 << 30);
+  const std::string blob = "/bakewell.v1.BlobService/", bake = "/bakewell.v1.BakeService/",
+                    work = "/bakewell.v1.WorkerService/", admin = "/bakewell.v1.AdminService/";
+  return {{blob + "FindMissing", find.SerializeAsString()},
+          {blob + "Upload", upload.SerializeAsString()},
+          {blob + "Download", download.SerializeAsString()},
+          {bake + "Submit", submit.SerializeAsString()},
+          {bake + "Estimate", submit.SerializeAsString()},
+          {bake + "Get", get.SerializeAsString()},
+          {bake + "List", list.SerializeAsString()},
+          {bake + "Watch", watch.SerializeAsString()},
+          {bake + "Cancel", cancel.SerializeAsString()},
+          {bake + "Fetch", fetch.SerializeAsString()},
+          {work + "Register", enroll.SerializeAsString()},
+          {work + "Lease", lease.SerializeAsString()},
+          {work + "Heartbeat", beat.SerializeAsString()},
+          {work + "Complete", complete.SerializeAsString()},
+          {work + "Fail", fail.SerializeAsString()},
+          {work + "Release", release.SerializeAsString()},
+          {admin + "ListWorkers", ""},
+          {admin + "Status", ""},
+          {admin + "Drain", drain.SerializeAsString()},
+          {admin + "SetPriority", priority.SerializeAsString()},
+          {admin + "SetQuota", quota.SerializeAsString()},
+          {admin + "CollectGarbage", collect.SerializeAsString()}};
+}
+
+// Bytes keyed by `seed`: random ones, or the valid message with a few bytes changed, cut, doubled or put in.
+std::string Mutated(const std::string& valid, uint32_t seed) {
+  std::minstd_rand random(seed);
+  const auto any = [&](size_t below) { return static_cast<size_t>(random() >> 4) % std::max<size_t>(1, below); };
+  std::string bytes = valid;
+  if (seed % 4 == 0) {
+    bytes.assign(any(200), '\0');
+    for (char& byte : bytes) byte = static_cast<char>(any(256));
+  }
+  for (size_t left = any(4); left > 0; --left) {
+    const size_t at = any(bytes.size());
+    switch (any(5)) {
+      case 0:
+        bytes.resize(at);
+        break;
+      case 1:
+        bytes += bytes.substr(at);
+        break;
+      case 2:
+        bytes.insert(at, std::string(any(5), static_cast<char>(any(256))));
+        break;
+      default:
+        if (at < bytes.size()) bytes[at] = static_cast<char>(any(256));
+    }
+  }
+  return bytes;
+}
+
+// Sends one message of any bytes to any method, and reads until the call ends.
+class RawCaller {
+ public:
+  explicit RawCaller(const std::shared_ptr<grpc::Channel>& channel) : stub_(channel) {}
+
+  grpc::StatusCode Call(const std::string& method, const std::string& bytes) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + milliseconds(500));
+    const auto call = stub_.PrepareCall(&context, method, &queue_);
+    grpc::Slice slice(bytes);
+    const grpc::ByteBuffer message(&slice, 1);
+    grpc::ByteBuffer answer;
+    grpc::Status status;
+    call->StartCall(this);
+    bool alive = Next();
+    if (alive) {
+      call->WriteLast(message, grpc::WriteOptions(), this);
+      alive = Next();
+    }
+    while (alive) {
+      call->Read(&answer, this);
+      alive = Next();
+    }
+    call->Finish(&status, this);
+    Next();
+    return status.error_code();
+  }
+
+ private:
+  bool Next() {
+    void* tag = nullptr;
+    bool ok = false;
+    return queue_.Next(&tag, &ok) && ok;
+  }
+  grpc::GenericStub stub_;
+  grpc::CompletionQueue queue_;
+};
+
+TEST_F(HostileTest, MutatedMessagesToEveryMethodAreAnsweredAndTheServiceGoesOn) {
+  Farm farm(OptionsHere());
+  farm.AddWorker("w");
+  const v1::Job before = farm.Bake(scene, "before");
+  RawCaller caller(farm.Connect()->channel());
+  const std::vector<Target> targets = Targets(Sha256Of(scene.Text()));
+  std::map<grpc::StatusCode, int> codes;
+  uint32_t seed = 0;
+  for (int round = 0; round < 150; ++round) {
+    for (const Target& target : targets) {
+      const grpc::StatusCode code = caller.Call(target.method, Mutated(target.valid, ++seed));
+      ++codes[code];
+      ASSERT_NE(code, grpc::DEADLINE_EXCEEDED) << target.method << " with seed " << seed << " was not answered";
+    }
+  }
+  EXPECT_EQ(codes[grpc::UNKNOWN], 0);
+  EXPECT_EQ(codes[grpc::UNAVAILABLE], 0) << "a call broke the connection";
+  EXPECT_GT(codes[grpc::OK], 100) << "too few messages were valid: they test the parser only";
+  EXPECT_GT(codes[grpc::INVALID_ARGUMENT], 100);
+  // Refusals are said once a minute and reason, not thousands of times.
+  EXPECT_GE(LinesWith("refused"), 1);
+  EXPECT_LE(LinesWith("refused"), 10);
+  scene.seed = 77;
+  EXPECT_EQ(farm.Bake(scene).state(), v1::DONE);
+  EXPECT_EQ(DigestsOf(*farm.Client()->Get(before.id())), DigestsOf(before));
+}
+
+// Symptom: a second Lease stream in a worker's name took the first one's place, ended, and the worker never heard of
+// it: it waited for tasks for ever.
+TEST_F(HostileTest, WorkerWhoseStreamIsTakenComesBack) {
+  Farm farm(OptionsHere());
+  farm.AddWorker("w");
+  farm.Bake(scene);
+  const auto workers = farm.Client()->Workers();
+  ASSERT_TRUE(workers.ok()) << workers.status();
+  v1::LeaseRequest thief;
+  thief.set_worker_id(workers->workers(0).id());
+  RawCaller(farm.Connect()->channel()).Call("/bakewell.v1.WorkerService/Lease", thief.SerializeAsString());
+  scene.seed = 2;
+  EXPECT_EQ(farm.Bake(scene).state(), v1::DONE);
+}
+
+TEST_F(HostileTest, MessagesAboveTheLimitAreRefused) {
+  Farm farm(OptionsHere());
+  RawCaller caller(farm.Connect()->channel());
+  const std::string big(5 << 20, 'x');
+  for (const Target& target : Targets(Digest{})) {
+    EXPECT_EQ(caller.Call(target.method, big), grpc::RESOURCE_EXHAUSTED) << target.method;
+  }
+  farm.AddWorker("w");
+  EXPECT_EQ(farm.Bake(scene).state(), v1::DONE);
+}
+
+// Symptom: an upload that stopped in the middle held its place among the transfers until its client went away.
+TEST_F(HostileTest, StalledUploadsAndReadersEnd) {
+  Farm::Options options = OptionsHere();
+  options.server.stall_limit = milliseconds(400);
+  Farm farm(options);
+  farm.AddWorker("w");
+  scene.bytes = 8 << 20;
+  scene.width = 1;
+  const v1::Job job = farm.Bake(scene);
+  const auto connection = farm.Connect();
+  const auto blobs = v1::BlobService::NewStub(connection->channel());
+  grpc::ClientContext uploading;
+  v1::UploadResponse response;
+  const auto writer = blobs->Upload(&uploading, &response);
+  v1::UploadRequest first;
+  first.set_digest(DigestToBytes(Sha256Of("abc")));
+  first.set_size_bytes(3);
+  first.set_data("a");
+  ASSERT_TRUE(writer->Write(first));
+  const auto bakes = v1::BakeService::NewStub(connection->channel());
+  grpc::ClientContext reading;
+  v1::FetchRequest request;
+  request.set_job_id(job.id());
+  request.set_name("out");
+  const auto reader = bakes->Fetch(&reading, request);
+  // Neither client does anything; both calls end by themselves.
+  EXPECT_TRUE(WaitFor([&] { return std::filesystem::is_empty(dir.path() / "farm" / "incoming"); }, seconds(5)));
+  EXPECT_NE(writer->Finish().error_code(), grpc::OK);
+  std::this_thread::sleep_for(milliseconds(1000));
+  v1::FetchChunk chunk;
+  while (reader->Read(&chunk)) {
+  }
+  EXPECT_EQ(reader->Finish().error_code(), grpc::CANCELLED);
+  // One that is slow, but moves, is left alone.
+  grpc::ClientContext slow;
+  const auto slow_writer = blobs->Upload(&slow, &response);
+  for (const char* part : {"a", "b", "c"}) {
+    first.set_data(part);
+    ASSERT_TRUE(slow_writer->Write(first));
+    first.clear_digest();
+    std::this_thread::sleep_for(milliseconds(200));
+  }
+  slow_writer->WritesDone();
+  EXPECT_TRUE(slow_writer->Finish().ok());
+}
+
+TEST_F(HostileTest, SmallSceneThatAsksForBillionsOfTexelsIsRefusedAtSubmit) {
+  Scene scene_of_one;
+  Object floor;
+  floor.lightmapped = true;
+  floor.position = {{0, 0, 0}, {100, 0, 0}, {0, 0, 100}};
+  floor.normal = {{0, 1, 0}, {0, 1, 0}, {0, 1, 0}};
+  floor.uv0 = floor.uv1 = {{0, 0}, {1, 0}, {0, 1}};
+  floor.index = {0, 1, 2};
+  scene_of_one.materials.emplace_back();
+  scene_of_one.objects.push_back(floor);
+  const std::vector<std::byte> bytes = SerializeScene(scene_of_one);
+  const std::string blob(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const plan::BlobReader read = [&](const Digest&) -> absl::StatusOr<std::string> { return blob; };
+  const plan::LevelPlanner planner;
+  BakeSettings settings;
+  const auto plan = [&] { return planner.Plan({{}, ProtoFromSettings(settings).SerializeAsString()}, read).status(); };
+  EXPECT_TRUE(plan().ok()) << plan();
+  settings.resolution = 16384;
+  EXPECT_EQ(plan().code(), absl::StatusCode::kResourceExhausted) << plan();
+  settings.resolution = 0;
+  settings.texels_per_metre = 1000;
+  EXPECT_EQ(plan().code(), absl::StatusCode::kResourceExhausted) << plan();
+}
+
+TEST_F(HostileTest, SceneWhoseCountsLieIsRefusedWithoutMemory) {
+  const plan::LevelPlanner planner;
+  Scene one;
+  one.materials.emplace_back();
+  const std::vector<std::byte> bytes = SerializeScene(one);
+  const std::string valid(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  // Every 32-bit word becomes a huge count in turn; what is refused is refused before anything is allocated for it.
+  for (size_t at = 0; at + 4 <= valid.size(); ++at) {
+    std::string blob = valid;
+    for (size_t i = 0; i < 4; ++i) blob[at + i] = static_cast<char>(i == 3 ? 0x3f : 0xff);
+    const plan::BlobReader read = [&](const Digest&) -> absl::StatusOr<std::string> { return blob; };
+    const absl::Status status = planner.Plan({{}, ProtoFromSettings({}).SerializeAsString()}, read).status();
+    EXPECT_TRUE(status.ok() || absl::IsInvalidArgument(status)) << at << " " << status;
+  }
+}
+
+TEST(RefusalLog, SaysEachReasonOnceAMinuteAndCountsTheRest) {
+  std::vector<std::string> lines;
+  rpc::RefusalLog log([&](std::string_view line) { lines.emplace_back(line); });
+  const absl::Status bad = absl::InvalidArgumentError("no\n\x1b[2Jsuch thing"),
+                     wrong = absl::UnauthenticatedError("who?");
+  int64_t now_us = 1'000'000'000;
+  for (int i = 0; i < 1000; ++i) log.Note(absl::StrCat("ipv4:10.0.0.1:", i), bad, now_us);
+  log.Note("ipv4:10.0.0.1:5", wrong, now_us);
+  log.Note("ipv4:10.0.0.2:5", bad, now_us);
+  log.Note("ipv4:10.0.0.1:5", absl::NotFoundError("not yet"), now_us);
+  EXPECT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0], "refused ipv4:10.0.0.1: INVALID_ARGUMENT: no\\n\\033[2Jsuch thing");
+  now_us += 61'000'000;
+  log.Note("ipv4:10.0.0.1:9", bad, now_us);
+  ASSERT_EQ(lines.size(), 4u);
+  EXPECT_NE(lines[3].find("(and 999 more since the last line)"), std::string::npos) << lines[3];
+}
+
+}  // namespace
+}  // namespace bakewell::test

@@ -1,0 +1,123 @@
+#include "worker/level/report.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <bit>
+#include <cmath>
+
+#include "core/base/fields.h"
+
+namespace bakewell {
+
+namespace {
+
+constexpr double kMostBadSamples = 1e-6;  // share of NaN or infinite samples above which a bake fails
+
+}  // namespace
+
+std::array<int64_t*, 11> BakeTally::Integers() {
+  return {&counters_.gather_rays,
+          &counters_.shadow_rays,
+          &counters_.bounce_rays,
+          &counters_.validity_rays,
+          &counters_.filter_rays,
+          &counters_.bad_samples,
+          &texels_,
+          &valid_,
+          &filtered_,
+          &direct_samples_,
+          &indirect_samples_};
+}
+
+void BakeTally::Add(const BakeTally& page) {
+  BakeTally other = page;
+  const auto to = Integers(), from = other.Integers();
+  for (size_t i = 0; i < to.size(); ++i) *to[i] += *from[i];
+  variance_ += other.variance_;
+  irradiance_ += other.irradiance_;
+}
+
+std::string BakeTally::Serialize() const {
+  BakeTally copy = *this;
+  FieldWriter writer;
+  for (const int64_t* value : copy.Integers()) writer.Put(static_cast<uint64_t>(*value));
+  for (const double value : {variance_, irradiance_}) writer.Put(std::bit_cast<uint64_t>(value));
+  return std::move(writer).bytes();
+}
+
+absl::StatusOr<BakeTally> BakeTally::Parse(std::string_view bytes) {
+  FieldReader reader(bytes);
+  BakeTally tally;
+  for (int64_t* value : tally.Integers()) *value = static_cast<int64_t>(reader.Get<uint64_t>());
+  for (double* value : {&tally.variance_, &tally.irradiance_}) *value = std::bit_cast<double>(reader.Get<uint64_t>());
+  BAKEWELL_RETURN_IF_ERROR(reader.Finish("tally"));
+  return tally;
+}
+
+void BakeTally::Count(const GatherCounters& counters) {
+  counters_.gather_rays += counters.gather_rays;
+  counters_.shadow_rays += counters.shadow_rays;
+  counters_.bounce_rays += counters.bounce_rays;
+  counters_.validity_rays += counters.validity_rays;
+  counters_.filter_rays += counters.filter_rays;
+  counters_.bad_samples += counters.bad_samples;
+}
+
+void BakeTally::Count(std::span<const TexelLight> lights, const FilterCounters& filter) {
+  filtered_ += filter.filtered;
+  texels_ += std::ssize(lights);
+  for (const TexelLight& light : lights) {
+    direct_samples_ += light.direct_samples;
+    indirect_samples_ += light.indirect_samples;
+    if (!light.valid) continue;
+    const double spread = 0.2126 * std::sqrt(static_cast<double>(light.variance.x)) +
+                          0.7152 * std::sqrt(static_cast<double>(light.variance.y)) +
+                          0.0722 * std::sqrt(static_cast<double>(light.variance.z));
+    variance_ += spread * spread;
+    irradiance_ += static_cast<double>(Luminance(light.irradiance));
+    ++valid_;
+  }
+}
+
+double BakeTally::EstimatedError() const {
+  const double count = static_cast<double>(valid_);
+  return irradiance_ > 0 ? std::sqrt(variance_ / count) / (irradiance_ / count) : 0;
+}
+
+absl::StatusOr<BakeReport> BakeTally::Finish(const level_task::PhotonCounts& photons,
+                                             int64_t overlapping_texels) const {
+  const double samples = static_cast<double>(counters_.gather_rays + counters_.shadow_rays);
+  if (static_cast<double>(counters_.bad_samples) > kMostBadSamples * samples) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(counters_.bad_samples, " of ", static_cast<int64_t>(samples),
+                     " samples were NaN or infinite; lights or emission of this scene are beyond what float can hold"));
+  }
+  BakeReport report;
+  report.counters = {{"texels/covered", texels_},
+                     {"texels/invalid", texels_ - valid_},
+                     {"texels/validity_rays", counters_.validity_rays},
+                     {"photons/rays", photons.photon_rays},
+                     {"photons/cells", photons.cells},
+                     {"density/rays", photons.density_rays},
+                     {"filter/rays", counters_.filter_rays},
+                     {"filter/texels", filtered_},
+                     {"gather/direct_samples", direct_samples_},
+                     {"gather/indirect_samples", indirect_samples_},
+                     {"gather/rays", counters_.gather_rays},
+                     {"gather/shadow_rays", counters_.shadow_rays},
+                     {"gather/bounce_rays", counters_.bounce_rays},
+                     {"gather/bad_samples", counters_.bad_samples}};
+  report.photons = photons.photons;
+  report.rays = photons.photon_rays + photons.density_rays + counters_.gather_rays + counters_.shadow_rays +
+                counters_.bounce_rays + counters_.validity_rays + counters_.filter_rays;
+  report.estimated_error = EstimatedError();
+  if (overlapping_texels > 0) {
+    report.warnings.push_back(
+        absl::StrCat(overlapping_texels,
+                     " texels are covered by more than one chart: their TEXCOORD_1 overlaps or lies closer than ",
+                     "a texel; use --uv generate"));
+  }
+  return report;
+}
+
+}  // namespace bakewell
