@@ -8,54 +8,77 @@
 namespace bakewell {
 
 inline constexpr int kBlocks = 8;
+inline constexpr uint32_t kRun = 64;  // samples
 
 // Sums of one estimator of one texel: irradiance and SH of the incident radiance, and the spread of the irradiance over
 // eight blocks of consecutive samples. Samples come in rounds that double their number; Double() halves the resolution
 // of the blocks so that eight always cover everything. Block means of one Sobol set repel one another, so that their
 // spread overstates the error of the whole set: the estimate errs on the safe side.
+// Floats that are added to a million times are off in the second digit where the addends are alike (each is rounded the
+// same way): runs of kRun samples are summed in float, the runs in double, which bounds the error by kRun 2^-24.
 class Accumulator {
  public:
   // A sample whose point was valid, whatever it found.
   void Count() { count_ += 1; }
-  // Sample `index` of `planned` in all (a multiple of kBlocks) found this irradiance.
+  // Sample `index` of `planned` in all (a multiple of kBlocks) found this irradiance. Samples come in order; the run
+  // ends with its block.
   void AddIrradiance(uint32_t index, uint32_t planned, Rgb irradiance) {
-    block_[static_cast<size_t>(index) * kBlocks / planned] += irradiance;
+    const size_t block = static_cast<size_t>(index) * kBlocks / planned;
+    if (++run_ > kRun || block != run_block_) EndRun(block);
+    run_irradiance_ += irradiance;
   }
   void AddSh(Vec3f dir_ws, Rgb radiance_over_pdf) {
     const auto basis = EvaluateSh(dir_ws);
-    for (size_t i = 0; i < kShCoefficients; ++i) sh_[i] += radiance_over_pdf * basis[i];
+    for (size_t i = 0; i < kShCoefficients; ++i) run_sh_[i] += radiance_over_pdf * basis[i];
   }
 
   // Before a round that doubles the samples.
   void Double() {
+    EndRun(0);
     for (size_t b = 0; b < kBlocks / 2; ++b) block_[b] = block_[2 * b] + block_[2 * b + 1];
     for (size_t b = kBlocks / 2; b < kBlocks; ++b) block_[b] = {};
   }
 
-  float count() const { return count_; }
-  Rgb Irradiance() const {
-    Rgb sum;
-    for (const Rgb& b : block_) sum += b;
-    return count_ > 0 ? sum / count_ : Rgb{};
-  }
+  float count() const { return static_cast<float>(count_); }
+  Rgb Irradiance() const { return ToFloat(Mean()); }
   RadianceSh Sh() const {
     RadianceSh sh;
-    for (size_t i = 0; i < kShCoefficients && count_ > 0; ++i) sh.lambda[i] = sh_[i] / count_;
+    for (size_t i = 0; i < kShCoefficients && count_ > 0; ++i)
+      sh.lambda[i] = ToFloat((sh_[i] + ToDouble(run_sh_[i])) / count_);
     return sh;
   }
   // Variance of Irradiance(), per channel, from the spread of the blocks.
   Rgb Variance() const {
     if (count_ <= 0) return {};
-    const Rgb mean = Irradiance() * (count_ / kBlocks);
-    Rgb sum;
-    for (const Rgb& b : block_) sum += (b - mean) * (b - mean);
-    return sum * (kBlocks / (count_ * count_ * (kBlocks - 1)));
+    const Vec3d mean = Mean() * (count_ / kBlocks);
+    Vec3d sum;
+    for (size_t b = 0; b < kBlocks; ++b) sum += (Block(b) - mean) * (Block(b) - mean);
+    return ToFloat(sum * (kBlocks / (count_ * count_ * (kBlocks - 1))));
   }
 
  private:
-  float count_ = 0;
-  std::array<Rgb, kBlocks> block_{};
-  std::array<Rgb, kShCoefficients> sh_{};
+  void EndRun(size_t next_block) {
+    block_[run_block_] += ToDouble(run_irradiance_);
+    for (size_t i = 0; i < kShCoefficients; ++i) sh_[i] += ToDouble(run_sh_[i]);
+    run_irradiance_ = {};
+    run_sh_ = {};
+    run_ = 1;
+    run_block_ = next_block;
+  }
+  Vec3d Block(size_t b) const { return b == run_block_ ? block_[b] + ToDouble(run_irradiance_) : block_[b]; }
+  Vec3d Mean() const {
+    Vec3d sum;
+    for (size_t b = 0; b < kBlocks; ++b) sum += Block(b);
+    return count_ > 0 ? sum / count_ : Vec3d{};
+  }
+
+  double count_ = 0;
+  std::array<Vec3d, kBlocks> block_{};
+  std::array<Vec3d, kShCoefficients> sh_{};
+  uint32_t run_ = 0;  // samples in the run
+  size_t run_block_ = 0;
+  Rgb run_irradiance_;
+  std::array<Rgb, kShCoefficients> run_sh_{};
 };
 
 }  // namespace bakewell

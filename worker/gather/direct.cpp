@@ -33,13 +33,12 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
     for (const int light : scene.tree.LightsOf(node)) {
       if (!cut_of_light_.empty()) cut_of_light_[static_cast<size_t>(light)] = static_cast<int>(cut_.size());
     }
-    const float visibility = scene.lights.local_count() < 2 ? 1 : Probe(node, texels, map, key, counters);
-    cut_.push_back({node, visibility});
+    cut_.push_back(scene.lights.local_count() < 2 ? Node{node} : Probe(node, texels, map, key, counters));
   }
 }
 
-float TileLights::Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
-                        GatherCounters& counters) const {
+TileLights::Node TileLights::Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
+                                   GatherCounters& counters) const {
   int tried = 0, seen = 0;
   for (uint32_t i = 0; i < kProbesPerNode; ++i) {
     const Texel& texel = texels[texels.size() * (2 * i + 1) / (2 * kProbesPerNode)];
@@ -58,16 +57,24 @@ float TileLights::Probe(int node, std::span<const Texel> texels, const TexelMap&
     ++counters.shadow_rays;
     seen += scene_.world.Occluded(ShadowRay(point, sample, probe_key)) ? 0 : 1;
   }
-  return tried > 0 ? std::max(kUnseenShare, static_cast<float>(seen) / static_cast<float>(tried)) : 1.0f;
+  if (tried == 0) return {node, 1, false};
+  return {node, std::max(kUnseenShare, static_cast<float>(seen) / static_cast<float>(tried)), seen > 0};
 }
 
 TileLights::Choice TileLights::ForTexel(const Texel& texel, float radius) const {
   Choice choice;
   std::vector<float> weights;
   const LightTree::Place place{texel.position, texel.flat ? texel.normal : Vec3f{}, radius};
+  double seen = 0, unseen = 0;
   for (const Node& node : cut_) {
     weights.push_back(scene_.tree.Importance(node.node, place) * node.visibility);
     choice.empty = choice.empty && !(weights.back() > 0);
+    (node.seen ? seen : unseen) += static_cast<double>(weights.back());
+  }
+  // Lights that no probe saw, however bright, get no more samples than those that were seen.
+  if (seen > 0 && unseen > seen) {
+    const float share = static_cast<float>(seen / unseen);
+    for (size_t i = 0; i < cut_.size(); ++i) weights[i] *= cut_[i].seen ? 1 : share;
   }
   if (!choice.empty) choice.distribution = Distribution1D(weights);
   return choice;

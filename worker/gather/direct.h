@@ -32,10 +32,11 @@ class TileLights {
   struct Node {
     int node = 0;          // of the tree
     float visibility = 1;  // (0, 1]
+    bool seen = true;      // by a probe, or there is nothing to choose from
   };
-  // Share of a few probes from the tile's texels that see the node; 1 where none could tell.
-  float Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
-              GatherCounters& counters) const;
+  // With the share of a few probes from the tile's texels that see the node; 1 where none could tell.
+  Node Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
+             GatherCounters& counters) const;
 
   const GatherScene& scene_;
   std::vector<Node> cut_;          // at most kMostNodes

@@ -1,7 +1,10 @@
 #include "worker/light/lights.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "worker/light/spherical_triangle.h"
 #include "worker/sample/warp.h"
@@ -25,6 +28,20 @@ Rgb MeanRadiance(const World& world, uint32_t triangle) {
   return sum * (1.0f / 64);
 }
 
+// What coinciding triangles with the same front and the same light have in common: the corners, smallest first and the
+// order around kept, and the radiance.
+using GlowKey = std::array<float, 12>;
+GlowKey KeyOf(const Triangle& t, Rgb radiance) {
+  const std::array<Vec3f, 3> corners{t.p0, t.p0 + t.e1, t.p0 + t.e2};
+  GlowKey least;
+  least.fill(kInfinity);
+  for (size_t turn = 0; turn < 3; ++turn) {
+    const Vec3f a = corners[turn], b = corners[(turn + 1) % 3], c = corners[(turn + 2) % 3];
+    least = std::min(least, {a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z, radiance.x, radiance.y, radiance.z});
+  }
+  return least;
+}
+
 }  // namespace
 
 float SpotFalloff(const PunctualLight& light, float cos_angle) {
@@ -40,14 +57,17 @@ LightSet::LightSet(const World& world, const Environment& environment) : world_(
     if (MaxComponent(light.intensity) <= 0) continue;
     (light.type == LightType::kDirectional ? directionals_ : locals_).push_back(light);
   }
+  std::map<GlowKey, int> glowing;
   for (uint32_t k = 0; k < world.triangles().size(); ++k) {
     if (!world.Emits(k)) continue;
     const Triangle& t = world.triangles()[k];
     const Rgb radiance = MeanRadiance(world, k);
     if (MaxComponent(radiance) <= 0) continue;
     if (light_of_triangle_.empty()) light_of_triangle_.assign(world.triangles().size(), -1);
-    light_of_triangle_[k] = local_count();
-    emissive_.push_back({k, 0.5f * Length(Cross(t.e1, t.e2)), radiance, world.MaterialOf(t).double_sided});
+    // Of triangles that coincide one glows: rays meet one of them only, whichever it is.
+    const auto [first, is_new] = glowing.try_emplace(KeyOf(t, radiance), local_count());
+    light_of_triangle_[k] = first->second;
+    if (is_new) emissive_.push_back({k, 0.5f * Length(Cross(t.e1, t.e2)), radiance, world.MaterialOf(t).double_sided});
   }
 }
 

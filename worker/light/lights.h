@@ -39,7 +39,7 @@ class LightSet {
   const World& world() const { return world_; }
   bool IsEmissive(int light) const { return light >= static_cast<int>(locals_.size()); }
 
-  // The local light of an emissive triangle, or -1.
+  // The local light of an emissive triangle, or -1. Triangles that coincide are one light.
   int LightOfTriangle(uint32_t triangle) const;
 
   // A point of local light `light` as seen from `position`. pdf: uniform in solid angle for near triangles, in area for

@@ -12,7 +12,7 @@
 namespace bakewell {
 
 inline constexpr int kVarianceGroups = 8;  // photon i belongs to group i mod 8, whatever the batches
-inline constexpr int kMaxPhotonBounces = 128;
+inline constexpr int kMaxPhotonBounces = 1024;
 
 // One share of the photons: a light (or the sky) and how many it emits.
 struct PhotonSource {
