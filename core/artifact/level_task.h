@@ -25,9 +25,9 @@ struct KindName {
 };
 inline constexpr KindName kChart{"chart/layout", 2};
 inline constexpr KindName kSurvey{"texel/survey", 2};
-inline constexpr KindName kEmit{"photon/emit", 2};
+inline constexpr KindName kEmit{"photon/emit", 3};
 inline constexpr KindName kDensity{"photon/density", 2};
-inline constexpr KindName kGather{"gather/tiles", 2};
+inline constexpr KindName kGather{"gather/tiles", 3};
 inline constexpr KindName kFinish{"finish/page", 3};
 inline constexpr KindName kReport{"finish/report", 3};
 inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};

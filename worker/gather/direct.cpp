@@ -1,6 +1,7 @@
 #include "worker/gather/direct.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
@@ -73,7 +74,7 @@ TileLights::Choice TileLights::ForTexel(const Texel& texel, float radius) const 
   }
   // Lights that no probe saw, however bright, get no more samples than those that were seen.
   if (seen > 0 && unseen > seen) {
-    const float share = static_cast<float>(seen / unseen);
+    const float share = std::max(std::numeric_limits<float>::min(), static_cast<float>(seen / unseen));
     for (size_t i = 0; i < cut_.size(); ++i) weights[i] *= cut_[i].seen ? 1 : share;
   }
   if (!choice.empty) choice.distribution = Distribution1D(weights);

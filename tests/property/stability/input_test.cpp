@@ -160,30 +160,28 @@ void ForEachNumber(const nlohmann::json& document, double bad, Visit visit) {
   }
 }
 
-TEST(GltfNumbers, BeyondWhatFloatsHoldAreRefusedByNameOrClamped) {
+TEST(GltfNumbers, BeyondWhatFloatsHoldAreRefusedByName) {
   GltfBuilder builder = FullGltf();
   ASSERT_TRUE(Load(builder).ok()) << Load(builder).status().message();
   const nlohmann::json document = builder.json;
-  int seen = 0, refused = 0;
+  int seen = 0;
   for (const double bad : {1e39, -1e39, 1e308}) {
     ForEachNumber(document, bad, [&](const std::string& path, const nlohmann::json& changed) {
       ++seen;
       builder.json = changed;
       const auto level = Load(builder);
-      if (!level.ok()) {
-        EXPECT_EQ(level.status().code(), absl::StatusCode::kInvalidArgument) << path;
-        EXPECT_NE(level.status().message().find("full.glb: "), std::string::npos) << level.status().message();
-        printf("%s: %s\n", path.c_str(), std::string(level.status().message()).c_str());
-        ++refused;
-        return;
-      }
-      // What a worker would be sent must be finite.
-      const auto sent = ParseScene(SerializeScene(level->scene));
-      EXPECT_TRUE(sent.ok()) << path << " = " << bad << ": " << sent.status().message();
+      EXPECT_EQ(level.status().code(), absl::StatusCode::kInvalidArgument) << path;
+      // The field, or the array whose element it is.
+      const nlohmann::json::json_pointer pointer(path);
+      const bool in_array = std::isdigit(pointer.back()[0]) != 0;
+      const std::string field =
+          in_array ? pointer.parent_pointer().back() + "[" + pointer.back() + "]" : pointer.back();
+      const std::string message(level.status().message());
+      EXPECT_NE(message.find("full.glb: "), std::string::npos) << message;
+      EXPECT_NE(message.find(field), std::string::npos) << field << ": " << message;
     });
   }
-  EXPECT_GT(seen, 100);
-  EXPECT_GT(refused, 50);
+  EXPECT_GT(seen, 150);
 }
 
 TEST(GltfNumbers, ThatJsonDoesNotHaveAreRefused) {

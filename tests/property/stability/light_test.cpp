@@ -72,6 +72,25 @@ TEST(Intensity, ADimLampInASealedRoomIsFoundBesideABrightOneInTheNext) {
   EXPECT_NEAR(in_dim.mean_ratio, 1, 0.05);
 }
 
+// Mean irradiance of a closed grey room, over the lamp's intensity.
+double MeanOverIntensity(float intensity) {
+  SceneBuilder builder({16, 16});
+  builder.AddRoom({0, 0, 0}, {3, 3, 3}, {.material = 0, .page = {0, 0, 16, 16}});
+  builder.AddPointLight({1, 2, 1}, {intensity, intensity, intensity});
+  BakeSettings settings = StressSettings(64, 10000);
+  settings.filter = true;
+  const BakedScene baked = BakeStress(builder.Build(), settings);
+  return Compare(baked, [&](Vec3d, Vec3d) { return static_cast<double>(intensity); }).mean_ratio;
+}
+
+TEST(Intensity, OfAnyMagnitudeGivesTheSameLight) {
+  const double one = MeanOverIntensity(1);
+  // Scaling rounds the photons' fixed point anew, no more.
+  for (const float intensity : {1e-15f, 1e-8f, 1e8f, 1e15f}) {
+    EXPECT_NEAR(MeanOverIntensity(intensity) / one, 1, 1e-4) << intensity;
+  }
+}
+
 TEST(LightNearASurface, TexelsBesideItFollowTheClosedForm) {
   SceneBuilder builder({16, 16});
   const int black = builder.AddMaterial(Rgb{0, 0, 0});
