@@ -48,9 +48,9 @@ class SmoothGrid {
   void Connect(int x, int y, int k);
 
   // The variance of a known texel as it and its neighbourhood say together: the mean over it and its connected
-  // neighbours (eight blocks alone say little), or what the texels within two stray from a plane, if that is less.
-  // Blocks of one Sobol set overstate the error of the whole; texels' sets are independent, so that their strays do
-  // not.
+  // neighbours (eight blocks alone say little), but at most four times its own, so that a quiet texel beside a bright
+  // one stays as it is; or what the texels within two stray from a plane, if that is less. Blocks of one Sobol set
+  // overstate the error of the whole; texels' sets are independent, so that their strays do not.
   float NoiseVariance(int x, int y) const;
 
   // The estimate of a window, and the variance that it will have once texels that are not known yet are as well known
