@@ -47,13 +47,32 @@ class Accumulator {
       sh.lambda[i] = ToFloat((sh_[i] + ToDouble(run_sh_[i])) / count_);
     return sh;
   }
-  // Variance of Irradiance(), per channel, from the spread of the blocks.
+  // Variance of Irradiance(), per channel, if its blocks were independent.
   Rgb Variance() const {
     if (count_ <= 0) return {};
     const Vec3d mean = Mean() * (count_ / kBlocks);
     Vec3d sum;
     for (size_t b = 0; b < kBlocks; ++b) sum += (Block(b) - mean) * (Block(b) - mean);
     return ToFloat(sum * (kBlocks / (count_ * count_ * (kBlocks - 1))));
+  }
+  // Mean squares of half the difference between the two halves (luminance): of the whole, of a half, of a quarter. Each
+  // is what doubling the samples to that size took off the variance (1 : 2 : 4 for independent samples).
+  std::array<double, 3> Halvings() const {
+    std::array<double, 3> result{};
+    if (count_ <= 0) return result;
+    std::array<double, kBlocks> mean;
+    for (size_t b = 0; b < kBlocks; ++b) {
+      mean[b] = static_cast<double>(Luminance(ToFloat(Block(b) * (kBlocks / count_))));
+    }
+    size_t pairs = kBlocks / 2;
+    for (size_t level = 3; level-- > 0; pairs /= 2) {
+      for (size_t k = 0; k < pairs; ++k) {
+        const double difference = 0.5 * (mean[2 * k] - mean[2 * k + 1]);
+        result[level] += difference * difference / static_cast<double>(pairs);
+        mean[k] = 0.5 * (mean[2 * k] + mean[2 * k + 1]);
+      }
+    }
+    return result;
   }
 
  private:

@@ -6,6 +6,7 @@
 
 #include "worker/filter/window.h"
 #include "worker/gather/direct.h"
+#include "worker/gather/guide.h"
 #include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
@@ -15,6 +16,7 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr double kLeastFall = 0.1, kLeastCorrection = 0.1;
 
 // Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
 Rgb FoundByGather(const GatherScene& scene, const TileLights& lights, const TileLights::Choice& choice,
@@ -35,16 +37,23 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights& lights, const Tile
 
 // Everything about one texel while its tile is in flight.
 struct Work {
+  explicit Work(TexelSampler its_sampler) : sampler(std::move(its_sampler)) {}
+
   TexelSampler sampler;
   TileLights::Choice choice{};
   uint32_t key = 0;
   bool valid = true;
   uint8_t open = 0;
-  float backs = 0, backface_share = 0;  // gather rays that met a back face; their share
+  float direct_correction = 1, indirect_correction = 1;  // of the accumulators' variances
+  float backs = 0, backface_share = 0;                   // gather rays that met a back face; their share
   bool direct_active = true, indirect_active = true;
   Accumulator direct{}, indirect{};
+  std::optional<GatherGuide> guide{};          // of gather rays, after the first round
   std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
   int direct_samples = 0, indirect_samples = 0;
+
+  Rgb DirectVariance() const { return direct.Variance() * direct_correction; }
+  Rgb IndirectVariance() const { return indirect.Variance() * indirect_correction; }
 };
 
 class TileGatherer {
@@ -58,9 +67,12 @@ class TileGatherer {
     Round(0, static_cast<uint32_t>(options_.min_samples));
     for (size_t i = 0; i < work_.size(); ++i) Validate(map_.texels[begin_ + i], work_[i]);
     if (options_.filter) Connect();
+    Correct();
     Decide();
+    Guide();
     for (int done = options_.min_samples; done < options_.max_samples; done *= 2) {
       if (!Round(static_cast<uint32_t>(done), static_cast<uint32_t>(2 * done))) break;
+      Correct();
       Decide();
     }
     std::vector<TexelLight> result;
@@ -75,7 +87,7 @@ class TileGatherer {
     work_.reserve(end_ - begin_);
     for (uint32_t i = begin_; i < end_; ++i) {
       const Texel& texel = map_.texels[i];
-      Work work{.sampler = TexelSampler(scene_.world, layout, map_, texel)};
+      Work work(TexelSampler(scene_.world, layout, map_, texel));
       work.key = TexelKey(texel, options_.seed);
       work.choice = lights_->ForTexel(texel, work.sampler.radius());
       if (NoExplicitLight(work)) work.direct_active = false;
@@ -86,6 +98,17 @@ class TileGatherer {
   bool NoExplicitLight(const Work& work) const {
     const EnvironmentLight& sky = scene_.lights.environment();
     return work.choice.empty && scene_.lights.directionals().empty() && (!sky.bright() || sky.smooth());
+  }
+
+  // The first round's rays guide the others.
+  void Guide() {
+    found_->Resample(UnitFloat(HashCombine(TexelKey(map_.texels[begin_], options_.seed), 0x9d1deu)));
+    for (Work& work : work_) {
+      if (!work.indirect_active) continue;
+      const TexelPoint point = work.sampler.At({0.5f, 0.5f});
+      work.guide = found_->GuideAt(point.surface.position, point.frame);
+    }
+    found_.reset();
   }
 
   // Samples [done, planned) of every active texel. False when none was active.
@@ -133,7 +156,8 @@ class TileGatherer {
       const TexelPoint point = work.sampler.At(u.Get2(2));
       if (!point.valid) continue;
       work.indirect.Count();
-      const Vec3f local = GatherHemisphere(u.Get2(0));
+      const GatherGuide::Sample drawn = work.guide ? work.guide->Draw(u.Get2(0)) : GatherGuide::Sample{u.Get2(0), 1};
+      const Vec3f local = GatherHemisphere(drawn.primary);
       const Vec3f dir = point.frame.ToWorld(local);
       const float pdf = GatherPdf(local.z);
       const uint32_t ray_key = HashCombine(work.key, 0x80000000u | i);
@@ -144,13 +168,18 @@ class TileGatherer {
       if (hit) {
         const GatheredRadiance reflected = ReflectedRadiance(scene_, hit, ray_key, counters_);
         radiance += reflected.radiance;
-        for (size_t g = 0; g < kVarianceGroups; ++g) work.group[g] += reflected.group[g] * (local.z / pdf);
+        for (size_t g = 0; g < kVarianceGroups; ++g)
+          work.group[g] += reflected.group[g] * (local.z / (pdf * drawn.density));
       }
       if (!IsFinite(radiance)) {
         ++counters_.bad_samples;
         continue;
       }
-      work.indirect.AddIrradiance(i, end, radiance * (local.z / pdf));
+      // Multiple importance sampling went by the unguided density, here as in GatherDirect.
+      radiance = radiance / drawn.density;
+      const Rgb irradiance = radiance * (local.z / pdf);
+      if (found_) found_->Add(hit ? scene_.world.PointAt(hit).position : dir, !hit, Luminance(irradiance));
+      work.indirect.AddIrradiance(i, end, irradiance);
       work.indirect.AddSh(dir, radiance / pdf);
     }
   }
@@ -168,7 +197,7 @@ class TileGatherer {
         const int64_t j = int64_t{map_.texel_at[texel.page][at]} - begin_;
         if (j < 0 || j >= static_cast<int64_t>(work_.size()) || !work_[j].valid) continue;
         if (map_.texels[begin_ + static_cast<size_t>(j)].chart != texel.chart) continue;
-        sum += Luminance(of(work_[j]).Variance());
+        sum += Luminance(of(work_[j]));
         ++count;
       }
     }
@@ -226,7 +255,7 @@ class TileGatherer {
       SmoothCell& cell = CellOf(i);
       cell.known = true;
       cell.value = Luminance(work_[i].indirect.Irradiance());
-      cell.variance = Luminance(work_[i].indirect.Variance());
+      cell.variance = Luminance(work_[i].IndirectVariance());
     }
     ForEachCell([&](size_t i, int x, int y) { result[i].variance = grid_.NoiseVariance(x, y); });
     ForEachCell([&](size_t i, int, int) { CellOf(i).variance = result[i].variance; });
@@ -244,6 +273,47 @@ class TileGatherer {
     }
   }
 
+  using Part = Accumulator Work::*;
+
+  // By what the spread of blocks overstates the variance of an estimator's whole sets, over the texels that took part
+  // in the last round: points of one Sobol set repel one another, the more the smoother what they sample. Each doubling
+  // took something off the variance; the doublings still to come would take off the rest, and fall as the last ones
+  // did.
+  float Overstatement(Part part, bool Work::*active) const {
+    std::array<double, 3> halving{};
+    double variance = 0;
+    for (const Work& work : work_) {
+      if (!work.valid || !(work.*active)) continue;
+      const Accumulator& sums = work.*part;
+      const float tolerated = Tolerated(Luminance(sums.Irradiance()));
+      if (!(tolerated > 0)) continue;
+      const double weight = 1 / (static_cast<double>(tolerated) * static_cast<double>(tolerated));
+      const std::array<double, 3> halvings = sums.Halvings();
+      for (size_t k = 0; k < halving.size(); ++k) halving[k] += halvings[k] * weight;
+      variance += static_cast<double>(Luminance(sums.Variance())) * weight;
+    }
+    if (!(variance > 0) || !(halving[2] > 0)) return 1;
+    // Per doubling; 1/2 for independent samples.
+    const double fall = std::clamp(std::sqrt(halving[0] / halving[2]), kLeastFall, 0.5);
+    return static_cast<float>(std::clamp(halving[0] * fall / (1 - fall) / variance, kLeastCorrection, 1.0));
+  }
+
+  void Correct() {
+    const float direct = Overstatement(&Work::direct, &Work::direct_active);
+    const float indirect = Overstatement(&Work::indirect, &Work::indirect_active);
+    for (Work& work : work_) {
+      if (work.direct_active) work.direct_correction = direct;
+      if (work.indirect_active) work.indirect_correction = indirect;
+    }
+  }
+
+  // What an error in this irradiance weighs: between equal absolute and equal relative errors, for what matters to the
+  // root mean square and to the eye.
+  float Tolerated(float irradiance) const {
+    const float mean = options_.mean_irradiance;
+    return std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
+  }
+
   // Switches off the estimators that meet their half of the target.
   void Decide() {
     if (options_.target_error <= 0) return;
@@ -256,14 +326,11 @@ class TileGatherer {
       // A stray sample must not raise its own tolerance: the smoothed light judges where there is one.
       const float indirect = options_.filter ? smooth[i].value : Luminance(work.indirect.Irradiance());
       const float irradiance = Luminance(work.direct.Irradiance()) + indirect;
-      // Between equal absolute and equal relative errors: what matters to the root mean square and to the eye.
-      const float mean = options_.mean_irradiance;
-      const float scale = options_.target_error * std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
+      const float scale = options_.target_error * Tolerated(irradiance);
       const float budget = 0.5f * scale * scale;
-      active[i] = {work.direct_active &&
-                       PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
+      active[i] = {work.direct_active && PooledVariance(i, [](const Work& w) { return w.DirectVariance(); }) > budget,
                    work.indirect_active && (!options_.filter || smooth[i].variance > budget) &&
-                       PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.indirect; }) > budget};
+                       PooledVariance(i, [](const Work& w) { return w.IndirectVariance(); }) > budget};
     }
     for (size_t i = 0; i < work_.size(); ++i) {
       work_[i].direct_active = active[i][0];
@@ -289,8 +356,8 @@ class TileGatherer {
     light.irradiance = work.direct.Irradiance() + work.indirect.Irradiance();
     const RadianceSh direct = work.direct.Sh(), indirect = work.indirect.Sh();
     for (size_t i = 0; i < kShCoefficients; ++i) light.sh.lambda[i] = direct.lambda[i] + indirect.lambda[i];
-    light.indirect = {work.indirect.Irradiance(), indirect, work.indirect.Variance()};
-    light.variance = work.direct.Variance() + light.indirect.variance;
+    light.indirect = {work.indirect.Irradiance(), indirect, work.IndirectVariance()};
+    light.variance = work.DirectVariance() + light.indirect.variance;
     // Photon noise is known in luminance; it is spread over the channels as the irradiance is.
     const float luminance = Luminance(light.irradiance);
     if (luminance > 0) {
@@ -309,6 +376,7 @@ class TileGatherer {
   const GatherOptions& options_;
   GatherCounters& counters_;
   std::optional<TileLights> lights_;
+  std::optional<FoundLight> found_{std::in_place};
   SmoothGrid grid_{kTileSide + 2 * SmoothGrid::kMostRadius, kTileSide + 2 * SmoothGrid::kMostRadius};
   int left_ = 0, top_ = 0;  // of the grid, on the page
   std::vector<Work> work_;

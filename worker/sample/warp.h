@@ -47,6 +47,13 @@ inline Vec3f GatherHemisphere(Vec2f u) {
   return DirectionFromCosine(std::min(z, 1.0f), u.y);
 }
 
+// The inverse of GatherHemisphere.
+inline Vec2f GatherSquare(Vec3f dir) {
+  constexpr float a = kGatherCosineShare;
+  const float azimuth = std::atan2(dir.y, dir.x) * (0.5f / kPiF);
+  return {dir.z * (a * dir.z + 1 - a), azimuth < 0 ? azimuth + 1 : azimuth};
+}
+
 // Barycentrics (u of e1, v of e2), uniform over a triangle (Heitz 2019, low-distortion map).
 inline Vec2f TriangleFromSquare(Vec2f u) {
   float a = u.x, b = u.y;

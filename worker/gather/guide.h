@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "core/math/vec.h"
+
+namespace bakewell {
+
+// A density over the primary samples of GatherHemisphere (cosine, azimuth), constant in each cell of a grid: where a
+// texel's light comes from.
+class GatherGuide {
+ public:
+  static constexpr int kRows = 8, kColumns = 16;  // cosine, azimuth
+  static constexpr int kCells = kRows * kColumns;
+
+  // weight: kCells, row by row, all above zero.
+  explicit GatherGuide(const std::array<float, kCells>& weight);
+
+  struct Sample {
+    Vec2f primary;  // in the unit square
+    float density;  // its mean over the square is 1
+  };
+  // Maps uniform u to the density, cell by cell in order, so that well spread points stay well spread.
+  Sample Draw(Vec2f u) const;
+
+ private:
+  std::array<float, kRows> row_cdf_;
+  std::array<float, kCells> cell_cdf_;  // within the row
+};
+
+// Light that the first rays of a tile's texels found, to guide the others by.
+class FoundLight {
+ public:
+  // A ray whose primary sample was uniform brought `luminance` (of its share of the irradiance [W m^-2]) from the point
+  // `place`, or from the direction `place` at infinity; 0 counts as well.
+  void Add(Vec3f place, bool at_infinity, float luminance);
+
+  // Keeps some of the rays, each as often as the square of its light says. `u` in [0, 1) decides which.
+  void Resample(float u);
+
+  // The guide of a texel at `position`: to the root mean square of the light in each part of the hemisphere about
+  // `frame`, which leaves the least variance, and in part uniform, so that no direction is lost. Nothing where it
+  // would gain next to nothing.
+  std::optional<GatherGuide> GuideAt(Vec3f position, const Frame& frame) const;
+
+ private:
+  struct Ray {
+    Vec3f place;
+    bool at_infinity;
+    float luminance;
+  };
+  std::vector<Ray> rays_, kept_;
+  double count_ = 0, mean_ = 0, square_ = 0;  // of the luminance; sums until Resample
+};
+
+}  // namespace bakewell
