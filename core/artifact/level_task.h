@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/artifact/skip.h"
 #include "core/artifact/task.h"
 #include "core/base/status.h"
 
@@ -48,8 +49,9 @@ absl::StatusOr<Settings> ParseSettings(std::string_view bytes);
 // What the planner has to know about the texels of a layout.
 struct Survey {
   uint64_t texels = 0, photons = 0;
-  uint64_t overlapping_texels = 0;         // covered by more than one chart
-  std::vector<uint32_t> texels_of_tile;    // tile_count
+  uint64_t overlapping_texels = 0;                           // covered by more than one chart
+  uint64_t alpha_triangles = 0, opaque_alpha_triangles = 0;  // with alpha, and of those, without need to look at it
+  std::vector<uint32_t> texels_of_tile;                      // tile_count
   std::vector<uint32_t> tile_end_of_page;  // one per page: its tiles end here, and begin where the page before ended
 };
 std::string Serialize(const Survey& survey);
@@ -58,6 +60,7 @@ absl::StatusOr<Survey> ParseSurvey(std::string_view bytes);
 // What the photons' tasks counted.
 struct PhotonCounts {
   int64_t photons = 0, photon_rays = 0, density_rays = 0, cells = 0;
+  SkipCount unfaced_backs;  // sides of cells, rays
 };
 std::string Serialize(const PhotonCounts& counts);
 absl::StatusOr<PhotonCounts> ParsePhotonCounts(std::string_view bytes);

@@ -59,7 +59,11 @@ std::string SettingsFor(const KindName& kind, BakeSettings settings) {
   settings.uv = defaults.uv;
   settings.resolution = defaults.resolution;
   settings.texels_per_metre = defaults.texels_per_metre;
-  if (kind.kind == level_task::kReport.kind) return SettingsJson(defaults);
+  if (kind.kind == level_task::kReport.kind) {
+    BakeSettings counted;
+    counted.no_skip = settings.no_skip;
+    return SettingsJson(counted);
+  }
   if (kind.kind == level_task::kGather.kind) return SettingsJson(settings);
   const bool filters = kind.kind == level_task::kFinish.kind;
   settings.filter = filters ? settings.filter : defaults.filter;

@@ -25,16 +25,24 @@ LightTree::Place Around(std::span<const Texel> texels) {
 }  // namespace
 
 TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, uint32_t key,
-                       GatherCounters& counters)
+                       float dispensable, GatherCounters& counters)
     : scene_(scene) {
   if (scene.tree.empty() || begin == end) return;
   const std::span<const Texel> texels = std::span(map.texels).subspan(begin, end - begin);
-  if (!scene.lights.emissive().empty()) cut_of_light_.resize(static_cast<size_t>(scene.lights.local_count()));
-  for (const int node : scene.tree.Cut(Around(texels), kMostNodes)) {
+  const int all = scene.lights.local_count();
+  if (!scene.lights.emissive().empty()) cut_of_light_.assign(static_cast<size_t>(all), -1);
+  const LightTree::Place place = Around(texels);
+  const std::vector<int> cut = scene.tree.Cut(place, kMostNodes), kept = scene.tree.Cull(cut, place, dispensable);
+  SkipCount& culled = counters.skip[Skip::kCulledLights];
+  culled.of += all;
+  culled.skipped += all;
+  for (const int node : kept) culled.skipped -= std::ssize(scene.tree.LightsOf(node));
+  if (all > 1) culled.saved += kProbesPerNode * (std::ssize(cut) - std::ssize(kept));
+  for (const int node : kept) {
     for (const int light : scene.tree.LightsOf(node)) {
       if (!cut_of_light_.empty()) cut_of_light_[static_cast<size_t>(light)] = static_cast<int>(cut_.size());
     }
-    cut_.push_back(scene.lights.local_count() < 2 ? Node{node} : Probe(node, texels, map, key, counters));
+    cut_.push_back(all < 2 ? Node{node} : Probe(node, texels, map, key, counters));
   }
 }
 
@@ -92,6 +100,7 @@ LightTree::Pick TileLights::Draw(const Choice& choice, const SurfacePoint& point
 float TileLights::Probability(const Choice& choice, const SurfacePoint& point, int light) const {
   if (choice.empty) return 0;
   const int at = cut_of_light_[static_cast<size_t>(light)];
+  if (at < 0) return 0;
   const float chosen = choice.distribution.Probability(at);
   if (!(chosen > 0)) return 0;
   return chosen * scene_.tree.Probability(cut_[static_cast<size_t>(at)].node, light, {point.position, point.normal});

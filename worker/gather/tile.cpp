@@ -6,6 +6,7 @@
 
 #include "worker/filter/window.h"
 #include "worker/gather/direct.h"
+#include "worker/gather/skip.h"
 #include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
@@ -15,9 +16,11 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kCulledShare = 0.1f;  // of what is tolerated in the dark
+constexpr int64_t kValidityRays = 8;  // of a texel whose light is left out
 
 // Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
-Rgb FoundByGather(const GatherScene& scene, const TileLights& lights, const TileLights::Choice& choice,
+Rgb FoundByGather(const GatherScene& scene, const std::optional<TileLights>& lights, const TileLights::Choice& choice,
                   const SurfacePoint& from, Vec3f dir, float pdf, const Hit& hit) {
   if (!hit) {
     const EnvironmentLight& sky = scene.lights.environment();
@@ -28,7 +31,7 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights& lights, const Tile
   if (light < 0) return {};
   const Rgb emission = scene.world.EmissionAt(hit);
   if (MaxComponent(emission) <= 0) return {};
-  const float chosen = lights.Probability(choice, from, light);
+  const float chosen = lights ? lights->Probability(choice, from, light) : 0;
   const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from.position, dir, hit.t) : 0;
   return emission * PowerHeuristic(pdf, light_pdf);
 }
@@ -39,6 +42,8 @@ struct Work {
   TileLights::Choice choice{};
   uint32_t key = 0;
   bool valid = true;
+  Leaves leaves = Leaves::kNothing;
+  bool audited = false;
   uint8_t open = 0;
   float backs = 0, backface_share = 0;  // gather rays that met a back face; their share
   bool direct_active = true, indirect_active = true;
@@ -53,10 +58,14 @@ class TileGatherer {
                const GatherOptions& options, GatherCounters& counters)
       : scene_(scene), map_(map), begin_(begin), end_(end), options_(options), counters_(counters) {}
 
-  std::vector<TexelLight> Run(const AtlasLayout& layout) {
+  // Nothing where the audit found light that was to be skipped.
+  std::optional<std::vector<TexelLight>> Run(const AtlasLayout& layout) {
     Prepare(layout);
-    Round(0, static_cast<uint32_t>(options_.min_samples));
-    for (size_t i = 0; i < work_.size(); ++i) Validate(map_.texels[begin_ + i], work_[i]);
+    SkipAudit audit;
+    for (size_t i = 0; i < work_.size(); ++i) FirstRound(map_.texels[begin_ + i], work_[i], audit);
+    audit.Count(counters_.skip);
+    if (!audit.passes()) return std::nullopt;
+    CountSkipped(audit);
     if (options_.filter) Connect();
     Decide();
     for (int done = options_.min_samples; done < options_.max_samples; done *= 2) {
@@ -70,22 +79,109 @@ class TileGatherer {
 
  private:
   void Prepare(const AtlasLayout& layout) {
-    const uint32_t tile_key = TexelKey(map_.texels[begin_], options_.seed ^ 0x711eu);
-    lights_.emplace(scene_, map_, begin_, end_, tile_key, counters_);
     work_.reserve(end_ - begin_);
     for (uint32_t i = begin_; i < end_; ++i) {
       const Texel& texel = map_.texels[i];
       Work work{.sampler = TexelSampler(scene_.world, layout, map_, texel)};
       work.key = TexelKey(texel, options_.seed);
-      work.choice = lights_->ForTexel(texel, work.sampler.radius());
-      if (NoExplicitLight(work)) work.direct_active = false;
       work_.push_back(std::move(work));
+    }
+    LeaveOut();
+    for (size_t i = 0; i < work_.size(); ++i) {
+      if (work_[i].direct_active) ChooseLights(map_.texels[begin_ + i], work_[i].sampler.radius(), work_[i]);
     }
   }
 
-  bool NoExplicitLight(const Work& work) const {
+  void ChooseLights(const Texel& texel, float radius, Work& work) {
+    if (!lights_) {
+      const uint32_t tile_key = TexelKey(map_.texels[begin_], options_.seed ^ 0x711eu);
+      const float dispensable = Skips(Skip::kCulledLights) ? kCulledShare * Tolerated(0) : -1;
+      lights_.emplace(scene_, map_, begin_, end_, tile_key, dispensable, counters_);
+    }
+    work.choice = lights_->ForTexel(texel, radius);
+    work.direct_active = !work.choice.empty || DistantLight();
+  }
+
+  // Light that is sampled, besides the local ones.
+  bool DistantLight() const {
     const EnvironmentLight& sky = scene_.lights.environment();
-    return work.choice.empty && scene_.lights.directionals().empty() && (!sky.bright() || sky.smooth());
+    return !scene_.lights.directionals().empty() || (sky.bright() && !sky.smooth());
+  }
+
+  bool Skips(Skip skip) const { return !options_.no_skip.Has(skip); }
+
+  // Decides what texels need not look for.
+  void LeaveOut() {
+    const bool lamps = !scene_.tree.empty() || DistantLight(), light = lamps || scene_.lights.environment().bright();
+    std::vector<uint32_t> keys;
+    std::vector<Leaves> leaves;
+    const PhotonDarkness darkness(scene_.cells, scene_.cache, Tolerated(0), options_.photon_flux);
+    for (Work& work : work_) {
+      const auto dark = light ? darkness.Of(work.sampler) : PhotonDarkness::Dark{};
+      if (light ? dark.all && Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) {
+        work.leaves = Leaves::kAll;
+      } else if (lamps && dark.direct && Skips(Skip::kUnseenLights)) {
+        work.leaves = Leaves::kDirect;
+      }
+      keys.push_back(work.key);
+      leaves.push_back(work.leaves);
+    }
+    for (const Leaves what : {Leaves::kDirect, Leaves::kAll}) {
+      const std::vector<bool> audited = DrawAudit(keys, leaves, what);
+      for (size_t i = 0; i < work_.size(); ++i) work_[i].audited = work_[i].audited || (light && audited[i]);
+    }
+    for (Work& work : work_) {
+      if (work.audited || work.leaves == Leaves::kNothing) continue;
+      work.direct_active = false;
+      work.indirect_active = work.leaves == Leaves::kDirect;
+    }
+  }
+
+  // What an error in this irradiance may be: between equal absolute and equal relative errors, for what matters to the
+  // root mean square and to the eye.
+  float Tolerated(float irradiance) const {
+    const float mean = options_.mean_irradiance;
+    return options_.target_error * std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
+  }
+
+  int64_t LightRays() const { return counters_.gather_rays + counters_.shadow_rays + counters_.bounce_rays; }
+
+  // Rays over the hemisphere, which also say which texels are valid; only those look for lights.
+  void FirstRound(const Texel& texel, Work& work, SkipAudit& audit) {
+    const uint32_t samples = static_cast<uint32_t>(options_.min_samples);
+    int64_t before = LightRays();
+    if (work.indirect_active) IndirectRound(work, 0, samples);
+    Validate(texel, work);
+    if (work.leaves == Leaves::kDirect) before = LightRays();
+    if (work.direct_active) DirectRound(work, 0, samples);
+    if (!work.audited || !work.valid) return;
+    const float direct = Luminance(work.direct.Irradiance()), indirect = Luminance(work.indirect.Irradiance());
+    const float mean = options_.mean_irradiance;
+    const float lost = work.leaves == Leaves::kAll ? direct + indirect : direct;
+    if (lost > 0) {
+      audit.Found(work.leaves, lost / mean, Tolerated(direct + indirect) / mean, LightRays() - before);
+    } else {
+      audit.Found(work.leaves, 0, 0, LightRays() - before);
+    }
+  }
+
+  void Count(const TexelValidity& validity) {
+    SkipCount& count = counters_.skip[Skip::kInvalidTexels];
+    ++count.of;
+    count.skipped += validity.rays_saved > 0 ? 1 : 0;
+    count.saved += validity.rays_saved;
+  }
+
+  void CountSkipped(const SkipAudit& audit) {
+    const bool light = !scene_.tree.empty() || DistantLight() || scene_.lights.environment().bright();
+    int64_t dark = 0, unlit = 0;
+    for (const Work& work : work_) {
+      if (!work.audited && work.leaves == Leaves::kAll) ++dark;
+      if (!work.audited && work.leaves == Leaves::kDirect) ++unlit;
+    }
+    const int64_t all = std::ssize(work_);
+    audit.Count(light ? Skip::kDarkCharts : Skip::kNoLight, Leaves::kAll, dark, all, kValidityRays, counters_.skip);
+    audit.Count(Skip::kUnseenLights, Leaves::kDirect, unlit, all, 0, counters_.skip);
   }
 
   // Samples [done, planned) of every active texel. False when none was active.
@@ -96,34 +192,48 @@ class TileGatherer {
   }
 
   bool RoundOf(Work& work, uint32_t done, uint32_t planned) {
-    if (work.direct_active) {
-      if (done > 0) work.direct.Double();
-      GatherDirect(scene_, work.sampler, *lights_, work.choice, work.key, done, planned, work.direct, counters_);
-      work.direct_samples = static_cast<int>(planned);
-    }
-    if (work.indirect_active) {
-      if (done > 0) work.indirect.Double();
-      GatherIndirect(work, done, planned);
-      work.indirect_samples = static_cast<int>(planned);
-    }
+    if (work.direct_active) DirectRound(work, done, planned);
+    if (work.indirect_active) IndirectRound(work, done, planned);
     return work.direct_active || work.indirect_active;
+  }
+
+  void DirectRound(Work& work, uint32_t done, uint32_t planned) {
+    if (done > 0) work.direct.Double();
+    GatherDirect(scene_, work.sampler, *lights_, work.choice, work.key, done, planned, work.direct, counters_);
+    work.direct_samples = static_cast<int>(planned);
+  }
+
+  void IndirectRound(Work& work, uint32_t done, uint32_t planned) {
+    if (done > 0) work.indirect.Double();
+    GatherIndirect(work, done, planned);
+    work.indirect_samples = static_cast<int>(planned);
   }
 
   // The first round's rays say how much of the hemisphere meets back faces. A texel that turns out to lie partly or
   // wholly inside other geometry starts again from its valid parts, or not at all.
   void Validate(const Texel& texel, Work& work) {
+    const std::optional<float> backs =
+        work.indirect.count() > 0 ? std::optional(work.backs / work.indirect.count()) : std::nullopt;
     const TexelValidity validity =
-        ProbeValidity(scene_.world, work.key, work.backs / work.indirect.count(), work.sampler);
+        ProbeValidity(scene_.world, work.key, backs, Skips(Skip::kInvalidTexels) ? PartSearch::kNear : PartSearch::kAll,
+                      work.sampler);
     counters_.validity_rays += validity.rays;
+    Count(validity);
     work.valid = validity.valid;
     work.backface_share = validity.backface_share;
     if (!work.valid) work.direct_active = work.indirect_active = false;
     if (work.valid && !validity.pushed_out && work.sampler.valid_mask() == 0xffff) return;
-    work.direct = work.indirect = {};
+    work.indirect = {};
     work.group = {};
-    // A texel that was pushed out lies up to its diagonal away.
-    if (validity.pushed_out) work.choice = lights_->ForTexel(texel, 3 * work.sampler.radius());
-    if (work.valid) RoundOf(work, 0, static_cast<uint32_t>(options_.min_samples));
+    if (!work.valid) return;
+    // A texel that was pushed out lies up to its diagonal away, where other light comes.
+    if (validity.pushed_out) {
+      work.leaves = Leaves::kNothing;
+      work.audited = false;
+      work.indirect_active = true;
+      ChooseLights(texel, 3 * work.sampler.radius(), work);
+    }
+    if (work.indirect_active) IndirectRound(work, 0, static_cast<uint32_t>(options_.min_samples));
   }
 
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
@@ -256,9 +366,7 @@ class TileGatherer {
       // A stray sample must not raise its own tolerance: the smoothed light judges where there is one.
       const float indirect = options_.filter ? smooth[i].value : Luminance(work.indirect.Irradiance());
       const float irradiance = Luminance(work.direct.Irradiance()) + indirect;
-      // Between equal absolute and equal relative errors: what matters to the root mean square and to the eye.
-      const float mean = options_.mean_irradiance;
-      const float scale = options_.target_error * std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
+      const float scale = Tolerated(irradiance);
       const float budget = 0.5f * scale * scale;
       active[i] = {work.direct_active &&
                        PooledVariance(i, [](const Work& w) -> const Accumulator& { return w.direct; }) > budget,
@@ -323,7 +431,13 @@ uint32_t TexelKey(const Texel& texel, uint32_t seed) {
 
 std::vector<TexelLight> GatherTile(const GatherScene& scene, const AtlasLayout& layout, const TexelMap& map, int tile,
                                    const GatherOptions& options, GatherCounters& counters) {
-  return TileGatherer(scene, map, map.tile_begin[tile], map.tile_begin[tile + 1], options, counters).Run(layout);
+  const uint32_t begin = map.tile_begin[tile], end = map.tile_begin[tile + 1];
+  auto lights = TileGatherer(scene, map, begin, end, options, counters).Run(layout);
+  if (lights) return *std::move(lights);
+  GatherOptions full = options;
+  full.no_skip.Add(Skip::kDarkCharts);
+  full.no_skip.Add(Skip::kUnseenLights);
+  return *TileGatherer(scene, map, begin, end, full, counters).Run(layout);
 }
 
 }  // namespace bakewell

@@ -30,7 +30,7 @@ Probed Probe(const Scene& scene, int x, int y, BackfaceMode mode = BackfaceMode:
   const PreparedLevel prepared = PrepareInMemory(scene, settings);
   const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * y + x)]];
   TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-  const TexelValidity validity = ProbeValidity(*prepared.world, 1, std::nullopt, sampler);
+  const TexelValidity validity = ProbeValidity(*prepared.world, 1, std::nullopt, PartSearch::kAll, sampler);
   return {validity, sampler.valid_mask()};
 }
 
