@@ -53,6 +53,8 @@ absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSe
   baked.photons = plan.photons;
   baked.photon_rays = map.totals.rays;
   baked.density_rays = result.cache.rays;
+  baked.counters.skip[Skip::kUnfacedBacks] = result.cache.unfaced_backs;
+  baked.counters.skip[Skip::kOpaqueAlpha] = world.opaque_alpha();
   baked.cells = static_cast<int64_t>(result.cells.cells().size());
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
   return result;

@@ -41,8 +41,9 @@ std::string Serialize(const Survey& survey) {
   writer.Put(survey.texels);
   writer.Put(survey.photons);
   writer.Put(survey.overlapping_texels);
-  writer.Put(survey.alpha_triangles);
-  writer.Put(survey.opaque_alpha_triangles);
+  for (const int64_t count : {survey.opaque_alpha.skipped, survey.opaque_alpha.of}) {
+    writer.Put(static_cast<uint64_t>(count));
+  }
   PutAll(survey.texels_of_tile, writer);
   PutAll(survey.tile_end_of_page, writer);
   return std::move(writer).bytes();
@@ -54,8 +55,9 @@ absl::StatusOr<Survey> ParseSurvey(std::string_view bytes) {
   survey.texels = reader.Get<uint64_t>();
   survey.photons = reader.Get<uint64_t>();
   survey.overlapping_texels = reader.Get<uint64_t>();
-  survey.alpha_triangles = reader.Get<uint64_t>();
-  survey.opaque_alpha_triangles = reader.Get<uint64_t>();
+  for (int64_t* count : {&survey.opaque_alpha.skipped, &survey.opaque_alpha.of}) {
+    *count = static_cast<int64_t>(reader.Get<uint64_t>());
+  }
   survey.texels_of_tile = GetAll(reader);
   survey.tile_end_of_page = GetAll(reader);
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("texel survey"));

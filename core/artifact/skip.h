@@ -15,17 +15,15 @@ enum class Skip : uint8_t {
   kNoLight,        // everything, where nothing shines
   kDarkCharts,     // texels that the photons say no light reaches
   kCulledLights,   // lights that cannot bring a tile more than a share of the target
-  kUnseenLights,   // direct light where the photons say that none arrives
-  kUniformCharts,  // texels between others that are all alike
   kShBands,        // bands of spherical harmonics below the target
   kOpaqueAlpha,    // alpha look-ups on triangles that are opaque all over
-  kUnseenSky,      // rays to suns and sky that nothing of a tile saw
+  kUnseenSky,      // rays to suns and sky from tiles that see no sky
   kInvalidTexels,  // light of texels inside solids, and the search for parts of them that are outside
   kUnfacedBacks,   // sides of surfaces that no photon met
 };
-inline constexpr std::array<const char*, 10> kSkipNames = {
-    "no_light",      "dark_charts",  "culled_lights", "unseen_lights",  "uniform_charts",
-    "sh_bands",      "opaque_alpha", "unseen_sky",    "invalid_texels", "unfaced_backs"};
+inline constexpr std::array<const char*, 8> kSkipNames = {"no_light",       "dark_charts",  "culled_lights",
+                                                          "sh_bands",       "opaque_alpha", "unseen_sky",
+                                                          "invalid_texels", "unfaced_backs"};
 
 // Kinds that are switched off.
 class SkipSet {

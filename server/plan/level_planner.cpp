@@ -65,9 +65,9 @@ std::string SettingsFor(const KindName& kind, BakeSettings settings) {
     return SettingsJson(counted);
   }
   if (kind.kind == level_task::kGather.kind) return SettingsJson(settings);
-  const bool filters = kind.kind == level_task::kFinish.kind;
-  settings.filter = filters ? settings.filter : defaults.filter;
-  settings.target_error = defaults.target_error;
+  const bool finishes = kind.kind == level_task::kFinish.kind;
+  settings.filter = finishes ? settings.filter : defaults.filter;
+  if (!finishes) settings.target_error = defaults.target_error;
   settings.min_samples = defaults.min_samples;
   settings.max_samples = defaults.max_samples;
   return SettingsJson(settings);

@@ -145,11 +145,12 @@ class DirectAdder {
 }  // namespace
 
 void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights& lights,
-                  const TileLights::Choice& choice, uint32_t key, uint32_t begin, uint32_t end, Accumulator& sum,
-                  GatherCounters& counters) {
+                  const TileLights::Choice& choice, Distant distant, uint32_t key, uint32_t begin, uint32_t end,
+                  Accumulator& sum, GatherCounters& counters) {
   const SobolSet set(HashCombine(key, 0xd12ec7u)), far_set(HashCombine(key, 0xfa25e7u));
   const EnvironmentLight& sky = scene.lights.environment();
-  const bool sky_sampled = sky.bright() && !sky.smooth();
+  const bool sky_sampled = distant == Distant::kSampled && sky.bright() && !sky.smooth();
+  const size_t suns = distant == Distant::kSampled ? scene.lights.directionals().size() : 0;
   DirectAdder adder(scene, sum, counters);
   for (uint32_t i = begin; i < end; ++i) {
     const SobolPoint u = set.At(i);
@@ -165,8 +166,8 @@ void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const T
       }
     }
     const SobolPoint far = far_set.At(i);
-    const TexelPoint under_sun = scene.lights.directionals().empty() ? point : sampler.AtMirrored(u.Get2(0));
-    for (size_t k = 0; k < scene.lights.directionals().size(); ++k) {
+    const TexelPoint under_sun = suns == 0 ? point : sampler.AtMirrored(u.Get2(0));
+    for (size_t k = 0; k < suns; ++k) {
       const Vec2f shift{UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k))),
                         UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k + 1)))};
       const Vec2f v = far.Get2(0) + (k == 0 ? Vec2f{} : shift);

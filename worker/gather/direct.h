@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "worker/gather/accumulate.h"
@@ -45,11 +46,14 @@ class TileLights {
   std::vector<int> cut_of_light_;  // per local light, -1 left out; where anything emits that rays can meet
 };
 
+// Suns, and a sky that is not smooth.
+enum class Distant : uint8_t { kSampled, kUnseen };
+
 // Direct light of one texel from explicitly sampled lights: the local lights (one sample of one light each), every
 // directional light, the sky where it is not smooth. Samples are points [begin, end) of a Sobol set, of `planned` in
 // all.
 void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights& lights,
-                  const TileLights::Choice& choice, uint32_t key, uint32_t begin, uint32_t end, Accumulator& sum,
-                  GatherCounters& counters);
+                  const TileLights::Choice& choice, Distant distant, uint32_t key, uint32_t begin, uint32_t end,
+                  Accumulator& sum, GatherCounters& counters);
 
 }  // namespace bakewell

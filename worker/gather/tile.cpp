@@ -1,5 +1,6 @@
 #include "worker/gather/tile.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -17,7 +18,9 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kCulledShare = 0.1f;  // of what is tolerated in the dark
-constexpr int64_t kValidityRays = 8;  // of a texel whose light is left out
+constexpr uint32_t kAuditSamples = 64;
+constexpr int64_t kWorthLeavingOut = 64;  // texels; fewer cost less than the audit
+constexpr int64_t kValidityRays = 8;      // of a texel whose light is left out
 
 // Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
 Rgb FoundByGather(const GatherScene& scene, const std::optional<TileLights>& lights, const TileLights::Choice& choice,
@@ -42,8 +45,7 @@ struct Work {
   TileLights::Choice choice{};
   uint32_t key = 0;
   bool valid = true;
-  Leaves leaves = Leaves::kNothing;
-  bool audited = false;
+  bool dark = false, audited = false;  // to be left out; but computed all the same
   uint8_t open = 0;
   float backs = 0, backface_share = 0;  // gather rays that met a back face; their share
   bool direct_active = true, indirect_active = true;
@@ -58,14 +60,10 @@ class TileGatherer {
                const GatherOptions& options, GatherCounters& counters)
       : scene_(scene), map_(map), begin_(begin), end_(end), options_(options), counters_(counters) {}
 
-  // Nothing where the audit found light that was to be skipped.
+  // Nothing where the audit found light that was to be left out.
   std::optional<std::vector<TexelLight>> Run(const AtlasLayout& layout) {
     Prepare(layout);
-    SkipAudit audit;
-    for (size_t i = 0; i < work_.size(); ++i) FirstRound(map_.texels[begin_ + i], work_[i], audit);
-    audit.Count(counters_.skip);
-    if (!audit.passes()) return std::nullopt;
-    CountSkipped(audit);
+    if (!FirstRound()) return std::nullopt;
     if (options_.filter) Connect();
     Decide();
     for (int done = options_.min_samples; done < options_.max_samples; done *= 2) {
@@ -86,7 +84,7 @@ class TileGatherer {
       work.key = TexelKey(texel, options_.seed);
       work_.push_back(std::move(work));
     }
-    LeaveOut();
+    if (lit_ ? Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) LeaveOutDark();
     for (size_t i = 0; i < work_.size(); ++i) {
       if (work_[i].direct_active) ChooseLights(map_.texels[begin_ + i], work_[i].sampler.radius(), work_[i]);
     }
@@ -99,42 +97,28 @@ class TileGatherer {
       lights_.emplace(scene_, map_, begin_, end_, tile_key, dispensable, counters_);
     }
     work.choice = lights_->ForTexel(texel, radius);
-    work.direct_active = !work.choice.empty || DistantLight();
-  }
-
-  // Light that is sampled, besides the local ones.
-  bool DistantLight() const {
-    const EnvironmentLight& sky = scene_.lights.environment();
-    return !scene_.lights.directionals().empty() || (sky.bright() && !sky.smooth());
+    work.direct_active = !work.choice.empty || scene_.lights.samples_distant();
   }
 
   bool Skips(Skip skip) const { return !options_.no_skip.Has(skip); }
 
-  // Decides what texels need not look for.
-  void LeaveOut() {
-    const bool lamps = !scene_.tree.empty() || DistantLight(), light = lamps || scene_.lights.environment().bright();
-    std::vector<uint32_t> keys;
-    std::vector<Leaves> leaves;
+  // Texels that no light reaches, but for those that are audited.
+  void LeaveOutDark() {
     const PhotonDarkness darkness(scene_.cells, scene_.cache, Tolerated(0), options_.photon_flux);
-    for (Work& work : work_) {
-      const auto dark = light ? darkness.Of(work.sampler) : PhotonDarkness::Dark{};
-      if (light ? dark.all && Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) {
-        work.leaves = Leaves::kAll;
-      } else if (lamps && dark.direct && Skips(Skip::kUnseenLights)) {
-        work.leaves = Leaves::kDirect;
-      }
-      keys.push_back(work.key);
-      leaves.push_back(work.leaves);
+    std::vector<bool> dark;
+    for (const Work& work : work_) dark.push_back(!lit_ || darkness.Covers(work.sampler));
+    const std::vector<bool> audited = lit_ ? DrawAudit(Keys(), dark) : std::vector<bool>(work_.size(), false);
+    for (size_t i = 0; i < work_.size(); ++i) {
+      work_[i].audited = audited[i];
+      if (dark[i] && !audited[i]) work_[i].direct_active = work_[i].indirect_active = false;
+      work_[i].dark = dark[i];
     }
-    for (const Leaves what : {Leaves::kDirect, Leaves::kAll}) {
-      const std::vector<bool> audited = DrawAudit(keys, leaves, what);
-      for (size_t i = 0; i < work_.size(); ++i) work_[i].audited = work_[i].audited || (light && audited[i]);
-    }
-    for (Work& work : work_) {
-      if (work.audited || work.leaves == Leaves::kNothing) continue;
-      work.direct_active = false;
-      work.indirect_active = work.leaves == Leaves::kDirect;
-    }
+  }
+
+  std::vector<uint32_t> Keys() const {
+    std::vector<uint32_t> keys;
+    for (const Work& work : work_) keys.push_back(work.key);
+    return keys;
   }
 
   // What an error in this irradiance may be: between equal absolute and equal relative errors, for what matters to the
@@ -146,23 +130,71 @@ class TileGatherer {
 
   int64_t LightRays() const { return counters_.gather_rays + counters_.shadow_rays + counters_.bounce_rays; }
 
-  // Rays over the hemisphere, which also say which texels are valid; only those look for lights.
-  void FirstRound(const Texel& texel, Work& work, SkipAudit& audit) {
+  // Rays over the hemisphere, which also say which texels are valid and whether the tile sees the sky; then lights.
+  // False where texels that were to be left out have light.
+  bool FirstRound() {
     const uint32_t samples = static_cast<uint32_t>(options_.min_samples);
-    int64_t before = LightRays();
-    if (work.indirect_active) IndirectRound(work, 0, samples);
-    Validate(texel, work);
-    if (work.leaves == Leaves::kDirect) before = LightRays();
-    if (work.direct_active) DirectRound(work, 0, samples);
-    if (!work.audited || !work.valid) return;
-    const float direct = Luminance(work.direct.Irradiance()), indirect = Luminance(work.indirect.Irradiance());
-    const float mean = options_.mean_irradiance;
-    const float lost = work.leaves == Leaves::kAll ? direct + indirect : direct;
-    if (lost > 0) {
-      audit.Found(work.leaves, lost / mean, Tolerated(direct + indirect) / mean, LightRays() - before);
-    } else {
-      audit.Found(work.leaves, 0, 0, LightRays() - before);
+    SkipAudit audit;
+    std::vector<int64_t> rays;
+    for (size_t i = 0; i < work_.size(); ++i) {
+      rays.push_back(-LightRays());
+      if (work_[i].indirect_active) IndirectRound(work_[i], 0, samples);
+      Validate(map_.texels[begin_ + i], work_[i]);
+      rays.back() += LightRays();
     }
+    if (Skips(Skip::kUnseenSky)) LeaveOutSky();
+    for (size_t i = 0; i < work_.size(); ++i) {
+      Work& work = work_[i];
+      rays[i] -= LightRays();
+      if (work.direct_active) DirectRound(work, 0, samples);
+      rays[i] += LightRays();
+      const float found = Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance());
+      if (work.audited && work.valid) AddFound(found, found, rays[i], audit);
+    }
+    audit.Count(counters_.skip);
+    if (audit.passes()) CountDark(audit);
+    return audit.passes();
+  }
+
+  void AddFound(float lost, float irradiance, int64_t rays, SkipAudit& audit) const {
+    const float mean = options_.mean_irradiance;
+    if (!(lost > 0)) return audit.Found(0, 0, rays);
+    audit.Found(lost / mean, Tolerated(irradiance) / mean, rays);
+  }
+
+  void CountDark(const SkipAudit& audit) {
+    SkipCount& count = counters_.skip[lit_ ? Skip::kDarkCharts : Skip::kNoLight];
+    int64_t dark = 0;
+    for (const Work& work : work_) dark += work.dark && !work.audited ? 1 : 0;
+    count.skipped += dark;
+    count.of += std::ssize(work_);
+    const int64_t full = lit_ ? audit.RaysOf(dark) : dark * options_.min_samples;
+    count.saved += std::max<int64_t>(0, full - dark * kValidityRays);
+  }
+
+  // Suns and sky, where no gather ray of the tile escaped and more samples of a few texels see none of them.
+  void LeaveOutSky() {
+    if (!scene_.lights.samples_distant()) return;
+    SkipCount& count = counters_.skip[Skip::kUnseenSky];
+    std::vector<bool> looking;
+    for (const Work& work : work_) looking.push_back(work.direct_active);
+    const int64_t texels = std::count(looking.begin(), looking.end(), true);
+    count.of += texels;
+    if (escaped_ > 0 || texels < kWorthLeavingOut) return;
+    const std::vector<bool> audited = DrawAudit(Keys(), looking);
+    SkipAudit audit;
+    for (size_t i = 0; i < work_.size(); ++i) {
+      if (!audited[i]) continue;
+      Accumulator lost;
+      GatherDirect(scene_, work_[i].sampler, *lights_, {}, Distant::kSampled, HashCombine(work_[i].key, 0x5c1u), 0,
+                   kAuditSamples, lost, counters_);
+      const float found = Luminance(lost.Irradiance());
+      AddFound(found, found, 0, audit);
+    }
+    audit.Count(counters_.skip);
+    if (!audit.passes()) return;
+    distant_ = Distant::kUnseen;
+    count.skipped += texels;
   }
 
   void Count(const TexelValidity& validity) {
@@ -170,18 +202,6 @@ class TileGatherer {
     ++count.of;
     count.skipped += validity.rays_saved > 0 ? 1 : 0;
     count.saved += validity.rays_saved;
-  }
-
-  void CountSkipped(const SkipAudit& audit) {
-    const bool light = !scene_.tree.empty() || DistantLight() || scene_.lights.environment().bright();
-    int64_t dark = 0, unlit = 0;
-    for (const Work& work : work_) {
-      if (!work.audited && work.leaves == Leaves::kAll) ++dark;
-      if (!work.audited && work.leaves == Leaves::kDirect) ++unlit;
-    }
-    const int64_t all = std::ssize(work_);
-    audit.Count(light ? Skip::kDarkCharts : Skip::kNoLight, Leaves::kAll, dark, all, kValidityRays, counters_.skip);
-    audit.Count(Skip::kUnseenLights, Leaves::kDirect, unlit, all, 0, counters_.skip);
   }
 
   // Samples [done, planned) of every active texel. False when none was active.
@@ -199,7 +219,9 @@ class TileGatherer {
 
   void DirectRound(Work& work, uint32_t done, uint32_t planned) {
     if (done > 0) work.direct.Double();
-    GatherDirect(scene_, work.sampler, *lights_, work.choice, work.key, done, planned, work.direct, counters_);
+    GatherDirect(scene_, work.sampler, *lights_, work.choice, distant_, work.key, done, planned, work.direct,
+                 counters_);
+    if (distant_ == Distant::kUnseen) counters_.skip[Skip::kUnseenSky].saved += planned - done;
     work.direct_samples = static_cast<int>(planned);
   }
 
@@ -228,8 +250,7 @@ class TileGatherer {
     if (!work.valid) return;
     // A texel that was pushed out lies up to its diagonal away, where other light comes.
     if (validity.pushed_out) {
-      work.leaves = Leaves::kNothing;
-      work.audited = false;
+      work.dark = work.audited = false;
       work.indirect_active = true;
       ChooseLights(texel, 3 * work.sampler.radius(), work);
     }
@@ -250,6 +271,7 @@ class TileGatherer {
       ++counters_.gather_rays;
       const Hit hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, ray_key));
       work.backs += MeetsBack(scene_.world, hit) ? 1.0f : 0.0f;
+      escaped_ += hit ? 0 : 1;
       Rgb radiance = FoundByGather(scene_, *lights_, work.choice, point.surface, dir, pdf, hit);
       if (hit) {
         const GatheredRadiance reflected = ReflectedRadiance(scene_, hit, ray_key, counters_);
@@ -417,6 +439,9 @@ class TileGatherer {
   const GatherOptions& options_;
   GatherCounters& counters_;
   std::optional<TileLights> lights_;
+  const bool lit_ = !scene_.tree.empty() || scene_.lights.environment().bright() || scene_.lights.samples_distant();
+  int64_t escaped_ = 0;  // gather rays
+  Distant distant_ = Distant::kSampled;
   SmoothGrid grid_{kTileSide + 2 * SmoothGrid::kMostRadius, kTileSide + 2 * SmoothGrid::kMostRadius};
   int left_ = 0, top_ = 0;  // of the grid, on the page
   std::vector<Work> work_;
@@ -436,7 +461,6 @@ std::vector<TexelLight> GatherTile(const GatherScene& scene, const AtlasLayout& 
   if (lights) return *std::move(lights);
   GatherOptions full = options;
   full.no_skip.Add(Skip::kDarkCharts);
-  full.no_skip.Add(Skip::kUnseenLights);
   return *TileGatherer(scene, map, begin, end, full, counters).Run(layout);
 }
 

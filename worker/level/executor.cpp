@@ -7,6 +7,7 @@
 #include "core/atlas/serialize.h"
 #include "core/scene/canonical.h"
 #include "proto/settings.h"
+#include "worker/finish/bands.h"
 #include "worker/finish/filter.h"
 #include "worker/level/codec.h"
 #include "worker/level/page_files.h"
@@ -138,8 +139,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
   survey.texels = map.texels.size();
   survey.photons = static_cast<uint64_t>(level->photons);
   survey.overlapping_texels = static_cast<uint64_t>(map.overlapping_texels);
-  survey.alpha_triangles = level->world->alpha_triangles();
-  survey.opaque_alpha_triangles = level->world->opaque_alpha_triangles();
+  survey.opaque_alpha = level->world->opaque_alpha();
   survey.tile_end_of_page.assign(map.pages.size(), 0);
   for (int tile = 0; tile < map.tile_count(); ++tile) {
     const uint32_t begin = map.tile_begin[tile], end = map.tile_begin[tile + 1];
@@ -243,6 +243,12 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
   }
   FilterCounters filtered;
   if (Filters(work.settings)) InArena([&] { FilterPage(level->texels, page, lights, filtered); });
+  if (!work.settings.no_skip.Has(Skip::kShBands)) {
+    const GatherOptions asked = BudgetOf(work.settings, level->texels).gather;
+    SkipCount dropped;
+    DropBands(level->texels, page, asked.target_error, asked.floor_share, lights, dropped);
+    tally.Count(Skip::kShBands, dropped);
+  }
   tally.Count(std::span(lights).subspan(first, next - first), filtered);
   BAKEWELL_ASSIGN_OR_RETURN(MadeOutputs outputs, PageFiles(level->texels, lights, page));
   outputs.push_back({"tally", tally.Serialize()});
@@ -257,8 +263,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Report(const Work& work) {
   BAKEWELL_ASSIGN_OR_RETURN(const level_task::PhotonCounts photons, level_task::ParsePhotonCounts(*totals_bytes));
   BakeTally tally;
   tally.Count(Skip::kUnfacedBacks, photons.unfaced_backs);
-  tally.Count(Skip::kOpaqueAlpha,
-              {static_cast<int64_t>(survey.opaque_alpha_triangles), static_cast<int64_t>(survey.alpha_triangles), 0});
+  tally.Count(Skip::kOpaqueAlpha, survey.opaque_alpha);
   for (const Blob& blob : InputsNamed(work.inputs, "tally")) {
     BAKEWELL_ASSIGN_OR_RETURN(const BakeTally page, BakeTally::Parse(*blob));
     tally.Add(page);

@@ -9,6 +9,7 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kInsideShare = 0.9f;  // of back faces: the texel is inside as a whole, if nothing divides it
 constexpr int kFirstRays = 8, kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
 
 // Share of `count` cosine-weighted rays that meet a back face first.
@@ -106,7 +107,9 @@ TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<floa
       known_share ? *known_share : BackShare(world, center.surface, center.frame, set, kFirstRays, result.rays);
   if (search == PartSearch::kNear) {
     if (result.backface_share == 0) return Saving(4, result);
-    if (!Crowded(world, center, sampler.radius(), result.rays)) return ProbeWhole(world, sampler, set, result);
+    if (result.backface_share > kInsideShare && !Crowded(world, center, sampler.radius(), result.rays)) {
+      return ProbeWhole(world, sampler, set, result);
+    }
   } else if (result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) {
     return result;
   }

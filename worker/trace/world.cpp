@@ -109,7 +109,7 @@ void World::SortByAlpha(bool look) {
     const Triangle& t = triangles_[k];
     const Material& material = MaterialOf(t);
     const bool has_alpha = material.alpha_mode != AlphaMode::kOpaque;
-    alpha_triangles_ += has_alpha ? 1 : 0;
+    opaque_alpha_.of += has_alpha ? 1 : 0;
     if (k < opaque_count_) {
       of_geometry_[kStops].push_back(k);
       continue;
@@ -119,7 +119,7 @@ void World::SortByAlpha(bool look) {
     const bool passes = mask ? most < material.alpha_cutoff - kAlphaRounding : most <= 0;
     const bool stops = mask ? least >= material.alpha_cutoff + kAlphaRounding : least >= 1;
     const bool whole = stops && (backfaces_ != BackfaceMode::kPass || material.double_sided) && !IsNeedle(t);
-    opaque_alpha_triangles_ += passes || whole ? 1 : 0;
+    opaque_alpha_.skipped += passes || whole ? 1 : 0;
     if (!passes) of_geometry_[whole ? kStops : kAsks].push_back(k);
   }
 }

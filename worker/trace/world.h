@@ -69,9 +69,8 @@ class World {
   Vec3f center() const { return center_; }
   float radius() const { return radius_; }
 
-  // Triangles of materials with alpha; those of them whose alpha is the same to every ray, so that none looks it up.
-  uint64_t alpha_triangles() const { return alpha_triangles_; }
-  uint64_t opaque_alpha_triangles() const { return opaque_alpha_triangles_; }
+  // Triangles whose alpha is the same to every ray, so that none looks it up, of those of materials with alpha.
+  const SkipCount& opaque_alpha() const { return opaque_alpha_; }
 
   const Material& MaterialOf(const Triangle& triangle) const { return scene_.materials[triangle.material]; }
   // The point at a hit, on the side the ray came from.
@@ -110,7 +109,7 @@ class World {
   // What Embree gets: triangles that stop every ray, those that Filter is asked about. What lets all rays pass is in
   // neither.
   std::array<std::vector<uint32_t>, 2> of_geometry_;
-  uint64_t alpha_triangles_ = 0, opaque_alpha_triangles_ = 0;
+  SkipCount opaque_alpha_;
   Vec3f center_;
   float radius_ = 0;
   std::unique_ptr<Device> device_;
