@@ -19,7 +19,8 @@ absl::StatusOr<SkipSet> SkipSetOf(std::span<const std::string> names) {
   SkipSet set;
   for (const std::string& name : names) {
     if (name == "all") return SkipSet::All();
-    const auto found = std::find_if(kSkipNames.begin(), kSkipNames.end(), [&](const char* kind) { return name == kind; });
+    const auto found =
+        std::find_if(kSkipNames.begin(), kSkipNames.end(), [&](const char* kind) { return name == kind; });
     if (found == kSkipNames.end()) {
       return absl::InvalidArgumentError(
           absl::StrCat("nothing to skip is called '", name, "': all, ", absl::StrJoin(kSkipNames, ", ")));
@@ -30,11 +31,7 @@ absl::StatusOr<SkipSet> SkipSetOf(std::span<const std::string> names) {
 }
 
 void SkipTally::Add(const SkipTally& other) {
-  for (size_t i = 0; i < kind.size(); ++i) {
-    kind[i].skipped += other.kind[i].skipped;
-    kind[i].of += other.kind[i].of;
-    kind[i].saved += other.kind[i].saved;
-  }
+  for (size_t i = 0; i < kind.size(); ++i) kind[i].Add(other.kind[i]);
   audited += other.audited;
   failed_over += other.failed_over;
   found_ppm = std::max(found_ppm, other.found_ppm);

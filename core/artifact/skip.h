@@ -43,7 +43,12 @@ absl::StatusOr<SkipSet> SkipSetOf(std::span<const std::string> names);
 // How much of a kind was left out.
 struct SkipCount {
   int64_t skipped = 0, of = 0;  // in the kind's own unit (schema/manifest.md)
-  int64_t saved = 0;            // rays, as the audited texels or closed forms tell
+  int64_t saved = 0;            // rays, as audited texels tell or are known to be saved at least
+  void Add(const SkipCount& other) {
+    skipped += other.skipped;
+    of += other.of;
+    saved += other.saved;
+  }
 };
 
 // What all kinds left out, and what the audit of it found: texels that were to be skipped, drawn by lot, computed in

@@ -117,13 +117,13 @@ Scene SlitLevel(int page, double gap_m) {
   return builder.Build();
 }
 
-Scene NichesLevel(int page) {
+Scene SpotsLevel(int page) {
   SceneBuilder builder({page, page});
   const float side = static_cast<float>(page);
   builder.AddQuad({0, 0, 0}, {60, 0, 0}, {0, 0, -60}, {.page = {0, 0, side, side}});
   for (int i = 0; i < 1024; ++i) {
     const double x = 1 + 1.875 * (i % 32), z = -1 - 1.875 * (i / 32);
-    builder.AddPointLight({x, 0.5, z}, {0.3f, 0.3f, 0.25f});
+    builder.AddSpotLight({x, 3, z}, {0, -1, 0}, {3, 3, 2.5f}, 0.5, 0.8);
   }
   return builder.Build();
 }

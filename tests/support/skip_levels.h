@@ -17,7 +17,7 @@ Scene PlaneLevel(int page);
 Scene FoliageLevel(int page);
 // A dark room beside a lit one; `gap_m` wide, a slit in the wall between them lets a streak of light through.
 Scene SlitLevel(int page, double gap_m);
-// A hall with a floor of 60 x 60 m and 1,024 small lamps, each in its own niche.
-Scene NichesLevel(int page);
+// A floor of 60 x 60 m under 1,024 spot lights that point down.
+Scene SpotsLevel(int page);
 
 }  // namespace bakewell

@@ -37,7 +37,6 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
   culled.of += all;
   culled.skipped += all;
   for (const int node : kept) culled.skipped -= std::ssize(scene.tree.LightsOf(node));
-  if (all > 1) culled.saved += kProbesPerNode * (std::ssize(cut) - std::ssize(kept));
   for (const int node : kept) {
     for (const int light : scene.tree.LightsOf(node)) {
       if (!cut_of_light_.empty()) cut_of_light_[static_cast<size_t>(light)] = static_cast<int>(cut_.size());

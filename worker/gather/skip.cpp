@@ -78,12 +78,13 @@ std::vector<bool> DrawAudit(std::span<const uint32_t> keys, const std::vector<bo
   return audited;
 }
 
-void SkipAudit::Found(float lost, float tolerated, int64_t rays) {
+void SkipAudit::Found(float lost, float tolerated, float mean, int64_t rays) {
   ++texels_;
   rays_ += rays;
+  if (!(lost > 0)) return;
   if (!(lost <= tolerated)) passes_ = false;
   constexpr float kMost = 1;  // so that the squares of a million texels can be added up
-  const int64_t ppm = std::llround(1e6 * static_cast<double>(std::min(lost, kMost)));
+  const int64_t ppm = std::llround(1e6 * static_cast<double>(lost < kMost * mean ? lost / mean : kMost));
   largest_ppm_ = std::max(largest_ppm_, ppm);
   square_ppm2_ += ppm * ppm;
 }

@@ -39,9 +39,9 @@ std::vector<bool> DrawAudit(std::span<const uint32_t> keys, const std::vector<bo
 // What texels of a tile that are audited, computed in full, say about those like them that are not.
 class SkipAudit {
  public:
-  // An audited texel found light [luminance, in means of the bake] that would have been lost, with `rays`; more than
-  // `tolerated` fails the tile.
-  void Found(float lost, float tolerated, int64_t rays);
+  // An audited texel found an irradiance that would have been lost, with `rays`; more than `tolerated` fails the tile.
+  // Luminances; it is noted in means of the bake.
+  void Found(float lost, float tolerated, float mean, int64_t rays);
   bool passes() const { return passes_; }
   void Count(SkipTally& tally) const;
   // Rays that `texels` more would have cost.

@@ -20,7 +20,6 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kCulledShare = 0.1f;  // of what is tolerated in the dark
 constexpr uint32_t kAuditSamples = 64;
 constexpr int64_t kWorthLeavingOut = 64;  // texels; fewer cost less than the audit
-constexpr int64_t kValidityRays = 8;      // of a texel whose light is left out
 
 // Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
 Rgb FoundByGather(const GatherScene& scene, const std::optional<TileLights>& lights, const TileLights::Choice& choice,
@@ -107,11 +106,11 @@ class TileGatherer {
     const PhotonDarkness darkness(scene_.cells, scene_.cache, Tolerated(0), options_.photon_flux);
     std::vector<bool> dark;
     for (const Work& work : work_) dark.push_back(!lit_ || darkness.Covers(work.sampler));
-    const std::vector<bool> audited = lit_ ? DrawAudit(Keys(), dark) : std::vector<bool>(work_.size(), false);
+    const std::vector<bool> audited = DrawAudit(Keys(), dark);
     for (size_t i = 0; i < work_.size(); ++i) {
-      work_[i].audited = audited[i];
-      if (dark[i] && !audited[i]) work_[i].direct_active = work_[i].indirect_active = false;
       work_[i].dark = dark[i];
+      work_[i].audited = lit_ && audited[i];
+      if (dark[i] && !work_[i].audited) work_[i].direct_active = work_[i].indirect_active = false;
     }
   }
 
@@ -128,8 +127,6 @@ class TileGatherer {
     return options_.target_error * std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
   }
 
-  int64_t LightRays() const { return counters_.gather_rays + counters_.shadow_rays + counters_.bounce_rays; }
-
   // Rays over the hemisphere, which also say which texels are valid and whether the tile sees the sky; then lights.
   // False where texels that were to be left out have light.
   bool FirstRound() {
@@ -137,49 +134,40 @@ class TileGatherer {
     SkipAudit audit;
     std::vector<int64_t> rays;
     for (size_t i = 0; i < work_.size(); ++i) {
-      rays.push_back(-LightRays());
+      rays.push_back(-counters_.light_rays());
       if (work_[i].indirect_active) IndirectRound(work_[i], 0, samples);
       Validate(map_.texels[begin_ + i], work_[i]);
-      rays.back() += LightRays();
+      rays.back() += counters_.light_rays();
     }
     if (Skips(Skip::kUnseenSky)) LeaveOutSky();
     for (size_t i = 0; i < work_.size(); ++i) {
       Work& work = work_[i];
-      rays[i] -= LightRays();
+      rays[i] -= counters_.light_rays();
       if (work.direct_active) DirectRound(work, 0, samples);
-      rays[i] += LightRays();
+      rays[i] += counters_.light_rays();
       const float found = Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance());
-      if (work.audited && work.valid) AddFound(found, found, rays[i], audit);
+      if (work.audited && work.valid) audit.Found(found, Tolerated(found), options_.mean_irradiance, rays[i]);
     }
     audit.Count(counters_.skip);
     if (audit.passes()) CountDark(audit);
     return audit.passes();
   }
 
-  void AddFound(float lost, float irradiance, int64_t rays, SkipAudit& audit) const {
-    const float mean = options_.mean_irradiance;
-    if (!(lost > 0)) return audit.Found(0, 0, rays);
-    audit.Found(lost / mean, Tolerated(irradiance) / mean, rays);
-  }
-
   void CountDark(const SkipAudit& audit) {
-    SkipCount& count = counters_.skip[lit_ ? Skip::kDarkCharts : Skip::kNoLight];
     int64_t dark = 0;
     for (const Work& work : work_) dark += work.dark && !work.audited ? 1 : 0;
-    count.skipped += dark;
-    count.of += std::ssize(work_);
     const int64_t full = lit_ ? audit.RaysOf(dark) : dark * options_.min_samples;
-    count.saved += std::max<int64_t>(0, full - dark * kValidityRays);
+    counters_.skip[lit_ ? Skip::kDarkCharts : Skip::kNoLight].Add(
+        {dark, std::ssize(work_), std::max<int64_t>(0, full - dark * kValidityFirstRays)});
   }
 
   // Suns and sky, where no gather ray of the tile escaped and more samples of a few texels see none of them.
   void LeaveOutSky() {
     if (!scene_.lights.samples_distant()) return;
-    SkipCount& count = counters_.skip[Skip::kUnseenSky];
     std::vector<bool> looking;
     for (const Work& work : work_) looking.push_back(work.direct_active);
     const int64_t texels = std::count(looking.begin(), looking.end(), true);
-    count.of += texels;
+    counters_.skip[Skip::kUnseenSky].of += texels;
     if (escaped_ > 0 || texels < kWorthLeavingOut) return;
     const std::vector<bool> audited = DrawAudit(Keys(), looking);
     SkipAudit audit;
@@ -189,19 +177,12 @@ class TileGatherer {
       GatherDirect(scene_, work_[i].sampler, *lights_, {}, Distant::kSampled, HashCombine(work_[i].key, 0x5c1u), 0,
                    kAuditSamples, lost, counters_);
       const float found = Luminance(lost.Irradiance());
-      AddFound(found, found, 0, audit);
+      audit.Found(found, Tolerated(found), options_.mean_irradiance, 0);
     }
     audit.Count(counters_.skip);
     if (!audit.passes()) return;
     distant_ = Distant::kUnseen;
-    count.skipped += texels;
-  }
-
-  void Count(const TexelValidity& validity) {
-    SkipCount& count = counters_.skip[Skip::kInvalidTexels];
-    ++count.of;
-    count.skipped += validity.rays_saved > 0 ? 1 : 0;
-    count.saved += validity.rays_saved;
+    counters_.skip[Skip::kUnseenSky].skipped += texels;
   }
 
   // Samples [done, planned) of every active texel. False when none was active.
@@ -240,7 +221,7 @@ class TileGatherer {
         ProbeValidity(scene_.world, work.key, backs, Skips(Skip::kInvalidTexels) ? PartSearch::kNear : PartSearch::kAll,
                       work.sampler);
     counters_.validity_rays += validity.rays;
-    Count(validity);
+    counters_.skip[Skip::kInvalidTexels].Add({validity.rays_saved > 0 ? 1 : 0, 1, validity.rays_saved});
     work.valid = validity.valid;
     work.backface_share = validity.backface_share;
     if (!work.valid) work.direct_active = work.indirect_active = false;

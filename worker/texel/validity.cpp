@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kInsideShare = 0.9f;  // of back faces: the texel is inside as a whole, if nothing divides it
-constexpr int kFirstRays = 8, kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
+constexpr int kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
 
 // Share of `count` cosine-weighted rays that meet a back face first.
 float BackShare(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, int count,
@@ -71,10 +71,6 @@ bool PushOut(const World& world, TexelSampler& sampler, const SobolSet& set, Tex
   return false;
 }
 
-}  // namespace
-
-namespace {
-
 TexelValidity Saving(int rays, TexelValidity result) {
   result.rays_saved = rays;
   return result;
@@ -104,7 +100,7 @@ TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<floa
   const SobolSet set(HashCombine(key, 0x7a11du));
   const TexelPoint center = sampler.At({0.5f, 0.5f});
   result.backface_share =
-      known_share ? *known_share : BackShare(world, center.surface, center.frame, set, kFirstRays, result.rays);
+      known_share ? *known_share : BackShare(world, center.surface, center.frame, set, kValidityFirstRays, result.rays);
   if (search == PartSearch::kNear) {
     if (result.backface_share == 0) return Saving(4, result);
     if (result.backface_share > kInsideShare && !Crowded(world, center, sampler.radius(), result.rays)) {

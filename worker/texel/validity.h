@@ -7,6 +7,8 @@
 
 namespace bakewell {
 
+inline constexpr int kValidityFirstRays = 8;  // where nobody knows yet
+
 // What rays from a texel say about where it lies.
 struct TexelValidity {
   bool valid = true;         // some of it sees the open side of the scene

@@ -24,7 +24,7 @@ absl::StatusOr<LoadedLevel> MakeLevel(const std::string& name) {
       {"dark", [] { return RoomsLevel(256, 0); }},   {"rooms", [] { return RoomsLevel(256, 1); }},
       {"bunker", [] { return BunkerLevel(256); }},   {"plane", [] { return PlaneLevel(256); }},
       {"foliage", [] { return FoliageLevel(128); }}, {"half_dark", [] { return SlitLevel(256, 0); }},
-      {"niches", [] { return NichesLevel(192); }}};
+      {"spots", [] { return SpotsLevel(192); }}};
   const auto made = levels.find(name);
   if (made == levels.end()) return LoadLevel(name);
   LoadedLevel level;
