@@ -68,6 +68,22 @@ TEST(ProbeValidity, HalfCoveredTexelIsMasked) {
   EXPECT_NEAR(probed.validity.backface_share, 0.5, 1e-6);
 }
 
+TEST(ProbeValidity, NearSearchFindsTheSameWithFewerRays) {
+  BakeSettings settings;
+  settings.footprint = 1;
+  for (const auto& [x0, x, share] : {std::tuple(1.0, 3, 1.0f), {1.0, 1, 1.0f}, {1.0, 0, 0.0f}, {1.5, 1, 0.5f}}) {
+    const PreparedLevel prepared = PrepareInMemory(FloorWithBox(x0, 6, 1, 6), settings);
+    const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(24 + x)]];
+    TexelSampler all(*prepared.world, prepared.layout, prepared.texels, texel), near = all;
+    const TexelValidity a = ProbeValidity(*prepared.world, 1, share, PartSearch::kAll, all);
+    const TexelValidity b = ProbeValidity(*prepared.world, 1, share, PartSearch::kNear, near);
+    EXPECT_EQ(a.valid, b.valid) << x;
+    EXPECT_EQ(a.pushed_out, b.pushed_out) << x;
+    EXPECT_EQ(all.valid_mask(), near.valid_mask()) << x;
+    EXPECT_EQ(b.rays_saved > 0, b.rays < a.rays) << x;
+  }
+}
+
 TEST(ProbeValidity, NothingHasABackWhereBackfacesPass) {
   const Probed probed = Probe(FloorWithBox(1, 6, 1, 6), 3, 3, BackfaceMode::kPass);
   EXPECT_TRUE(probed.validity.valid);
