@@ -65,6 +65,31 @@ Quality QualityOf(v1::BakeSettings::Quality quality) {
   return quality == v1::BakeSettings::HIGH ? Quality::kHigh : Quality::kMedium;
 }
 
+// The fields of the message are called as the kinds are.
+const google::protobuf::FieldDescriptor* SkipField(Skip skip) {
+  return v1::Skip::descriptor()->FindFieldByName(kSkipNames[static_cast<size_t>(skip)]);
+}
+
+v1::Skip ProtoSkip(const SkipSet& off) {
+  v1::Skip message;
+  for (size_t i = 0; i < kSkipNames.size(); ++i) {
+    const auto skip = static_cast<Skip>(i);
+    message.GetReflection()->SetBool(&message, SkipField(skip), !off.Has(skip));
+  }
+  return message;
+}
+
+SkipSet SkipOf(const v1::Skip& message) {
+  SkipSet off;
+  for (size_t i = 0; i < kSkipNames.size(); ++i) {
+    const auto skip = static_cast<Skip>(i);
+    const auto* const field = SkipField(skip);
+    const auto* const reflection = message.GetReflection();
+    if (reflection->HasField(message, field) && !reflection->GetBool(message, field)) off.Add(skip);
+  }
+  return off;
+}
+
 Colour ProtoColour(const Rgb& rgb) {
   const float values[] = {rgb.x, rgb.y, rgb.z};
   return Colour(std::begin(values), std::end(values));
@@ -148,6 +173,7 @@ v1::BakeSettings ProtoFromSettings(const BakeSettings& settings) {
   message.set_footprint(settings.footprint);
   message.set_filter(settings.filter);
   message.set_seed(settings.seed);
+  *message.mutable_skip() = ProtoSkip(settings.no_skip);
   if (settings.environment) *message.mutable_environment() = ProtoEnvironment(*settings.environment);
   return message;
 }
@@ -169,6 +195,7 @@ absl::StatusOr<BakeSettings> SettingsFromProto(const v1::BakeSettings& message, 
   if (message.has_footprint()) settings.footprint = message.footprint();
   if (message.has_filter()) settings.filter = message.filter();
   settings.seed = message.seed();
+  settings.no_skip = SkipOf(message.skip());
   if (message.has_environment()) {
     BAKEWELL_ASSIGN_OR_RETURN(settings.environment, EnvironmentOf(message.environment(), read_latlong));
   }

@@ -1,6 +1,7 @@
 #include "client/cli/bake_flags.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <filesystem>
 #include <map>
@@ -89,6 +90,10 @@ void AddBakeOnlyFlags(CLI::App& command, BakeFlags& flags) {
   command.add_option("--target-error", flags.target_error, "Relative standard error at which a texel stops: 0.02");
   command.add_option("--samples", flags.max_samples, "Most gather rays a texel, a power of two");
   command.add_option("--photons", flags.photons, "Photons to emit");
+  command
+      .add_option("--no-skip", flags.no_skip,
+                  "Compute what seems not to matter, too: all, or some of " + absl::StrJoin(kSkipNames, ", "))
+      ->delimiter(',');
   command.add_option("--photon-batches", flags.photon_batches, "Tasks that the photons are split into (8)");
 }
 
@@ -112,6 +117,9 @@ absl::StatusOr<BakeSettings> SettingsFromFlags(const BakeFlags& flags) {
   settings.footprint = flags.footprint.value_or(settings.footprint);
   settings.filter = settings.filter && !flags.no_filter;
   settings.seed = flags.seed.value_or(settings.seed);
+  if (!flags.no_skip.empty()) {
+    BAKEWELL_ASSIGN_OR_RETURN(settings.no_skip, SkipSetOf(flags.no_skip));
+  }
   if (flags.environment) {
     BAKEWELL_ASSIGN_OR_RETURN(settings.environment, ParseEnvironment(*flags.environment));
   }

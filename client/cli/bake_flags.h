@@ -22,6 +22,7 @@ struct BakeFlags {
   std::optional<std::string> uv, density, quality, backfaces, environment;
   std::optional<int> resolution, max_samples, photon_batches;
   bool no_filter = false;
+  std::vector<std::string> no_skip;
   std::optional<float> texels_per_metre, target_error, albedo_limit, footprint;
   std::optional<int64_t> photons;
   std::optional<uint32_t> seed;

@@ -32,7 +32,8 @@ absl::StatusOr<PreparedLevel> PrepareLevel(LoadedLevel level, const BakeSettings
   clock.End();
   clock.Begin("texels");
   progress.Report("texels", 0, 1);
-  BAKEWELL_ASSIGN_OR_RETURN(prepared.world, World::Build(scene, settings.backfaces, settings.albedo_limit));
+  BAKEWELL_ASSIGN_OR_RETURN(prepared.world,
+                            World::Build(scene, settings.backfaces, settings.albedo_limit, settings.no_skip));
   prepared.lights = std::make_unique<LightSet>(*prepared.world, scene.environment);
   prepared.texels = RasterizeTexels(*prepared.world, prepared.layout, settings.footprint);
   WarnAboutTexels(prepared.texels, prepared.warnings);

@@ -17,6 +17,7 @@ void Add(const GatherCounters& from, GatherCounters& to) {
   to.validity_rays += from.validity_rays;
   to.filter_rays += from.filter_rays;
   to.bad_samples += from.bad_samples;
+  to.skip.Add(from.skip);
 }
 
 struct Photons {
@@ -47,11 +48,13 @@ absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSe
   });
   clock.End();
   clock.Begin("density");
-  result.cache = EstimateDensity(world, result.cells, map, plan, {}, progress);
+  result.cache = EstimateDensity(world, result.cells, map, plan, DensityOf(settings), progress);
   clock.End();
   baked.photons = plan.photons;
   baked.photon_rays = map.totals.rays;
   baked.density_rays = result.cache.rays;
+  baked.counters.skip[Skip::kUnfacedBacks] = result.cache.unfaced_backs;
+  baked.counters.skip[Skip::kOpaqueAlpha] = world.opaque_alpha();
   baked.cells = static_cast<int64_t>(result.cells.cells().size());
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
   return result;
@@ -69,6 +72,7 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
   const LightTree tree(*prepared.lights);
   const GatherScene scene{*prepared.world, *prepared.lights, tree, photons.cells, photons.cache};
   budget.gather.mean_irradiance = MeanIrradiance(prepared.texels, photons.cells, photons.cache);
+  budget.gather.photon_flux = MeanPhotonFlux(photons.cells, photons.cache);
   baked.lights.resize(prepared.texels.texels.size());
   const int tiles = prepared.texels.tile_count();
   std::atomic<int> done{0};

@@ -41,6 +41,9 @@ std::string Serialize(const Survey& survey) {
   writer.Put(survey.texels);
   writer.Put(survey.photons);
   writer.Put(survey.overlapping_texels);
+  for (const int64_t count : {survey.opaque_alpha.skipped, survey.opaque_alpha.of}) {
+    writer.Put(static_cast<uint64_t>(count));
+  }
   PutAll(survey.texels_of_tile, writer);
   PutAll(survey.tile_end_of_page, writer);
   return std::move(writer).bytes();
@@ -52,6 +55,9 @@ absl::StatusOr<Survey> ParseSurvey(std::string_view bytes) {
   survey.texels = reader.Get<uint64_t>();
   survey.photons = reader.Get<uint64_t>();
   survey.overlapping_texels = reader.Get<uint64_t>();
+  for (int64_t* count : {&survey.opaque_alpha.skipped, &survey.opaque_alpha.of}) {
+    *count = static_cast<int64_t>(reader.Get<uint64_t>());
+  }
   survey.texels_of_tile = GetAll(reader);
   survey.tile_end_of_page = GetAll(reader);
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("texel survey"));
@@ -60,7 +66,8 @@ absl::StatusOr<Survey> ParseSurvey(std::string_view bytes) {
 
 std::string Serialize(const PhotonCounts& counts) {
   FieldWriter writer;
-  for (const int64_t count : {counts.photons, counts.photon_rays, counts.density_rays, counts.cells}) {
+  for (const int64_t count : {counts.photons, counts.photon_rays, counts.density_rays, counts.cells,
+                              counts.unfaced_backs.skipped, counts.unfaced_backs.of, counts.unfaced_backs.saved}) {
     writer.Put(static_cast<uint64_t>(count));
   }
   return std::move(writer).bytes();
@@ -69,7 +76,8 @@ std::string Serialize(const PhotonCounts& counts) {
 absl::StatusOr<PhotonCounts> ParsePhotonCounts(std::string_view bytes) {
   FieldReader reader(bytes);
   PhotonCounts counts;
-  for (int64_t* count : {&counts.photons, &counts.photon_rays, &counts.density_rays, &counts.cells}) {
+  for (int64_t* count : {&counts.photons, &counts.photon_rays, &counts.density_rays, &counts.cells,
+                         &counts.unfaced_backs.skipped, &counts.unfaced_backs.of, &counts.unfaced_backs.saved}) {
     *count = static_cast<int64_t>(reader.Get<uint64_t>());
   }
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("photon counts"));

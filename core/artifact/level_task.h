@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/artifact/skip.h"
 #include "core/artifact/task.h"
 #include "core/base/status.h"
 
@@ -24,12 +25,12 @@ struct KindName {
   uint32_t code_version;
 };
 inline constexpr KindName kChart{"chart/layout", 2};
-inline constexpr KindName kSurvey{"texel/survey", 2};
+inline constexpr KindName kSurvey{"texel/survey", 3};
 inline constexpr KindName kEmit{"photon/emit", 3};
-inline constexpr KindName kDensity{"photon/density", 2};
-inline constexpr KindName kGather{"gather/tiles", 3};
-inline constexpr KindName kFinish{"finish/page", 3};
-inline constexpr KindName kReport{"finish/report", 3};
+inline constexpr KindName kDensity{"photon/density", 3};
+inline constexpr KindName kGather{"gather/tiles", 4};
+inline constexpr KindName kFinish{"finish/page", 4};
+inline constexpr KindName kReport{"finish/report", 4};
 inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};
 
 // The artifacts that are no files of the result: they say how to write scene.glb and the manifest.
@@ -49,6 +50,7 @@ absl::StatusOr<Settings> ParseSettings(std::string_view bytes);
 struct Survey {
   uint64_t texels = 0, photons = 0;
   uint64_t overlapping_texels = 0;         // covered by more than one chart
+  SkipCount opaque_alpha;                  // triangles
   std::vector<uint32_t> texels_of_tile;    // tile_count
   std::vector<uint32_t> tile_end_of_page;  // one per page: its tiles end here, and begin where the page before ended
 };
@@ -58,6 +60,7 @@ absl::StatusOr<Survey> ParseSurvey(std::string_view bytes);
 // What the photons' tasks counted.
 struct PhotonCounts {
   int64_t photons = 0, photon_rays = 0, density_rays = 0, cells = 0;
+  SkipCount unfaced_backs;  // sides of cells, rays
 };
 std::string Serialize(const PhotonCounts& counts);
 absl::StatusOr<PhotonCounts> ParsePhotonCounts(std::string_view bytes);

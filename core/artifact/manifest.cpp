@@ -30,6 +30,28 @@ Json FilesJson(const std::vector<ManifestFile>& files) {
   return array;
 }
 
+// "skip/KIND/NUMBER" among the counters, as an object for each kind.
+constexpr std::string_view kSkipPrefix = "skip/";
+Json SkipJson(const std::map<std::string, int64_t>& counters) {
+  Json skip = Json::object();
+  for (const auto& [name, count] : counters) {
+    const size_t last = name.rfind('/');
+    if (!name.starts_with(kSkipPrefix) || last < kSkipPrefix.size()) continue;
+    Json& kind = skip[name.substr(kSkipPrefix.size(), last - kSkipPrefix.size())];
+    const std::string number = name.substr(last + 1);
+    kind[number] = number == "enabled" ? Json(count != 0) : Json(count);
+  }
+  return skip;
+}
+
+Json CountersJson(const std::map<std::string, int64_t>& counters) {
+  Json json = Json::object();
+  for (const auto& [name, count] : counters) {
+    if (!name.starts_with(kSkipPrefix)) json[name] = count;
+  }
+  return json;
+}
+
 Json StatisticsJson(const Manifest& manifest) {
   double wall_seconds = 0, cpu_seconds = 0;
   for (const PhaseTime& phase : manifest.phases) {
@@ -42,7 +64,8 @@ Json StatisticsJson(const Manifest& manifest) {
           {"photons", manifest.photons},
           {"estimated_error", manifest.estimated_error},
           {"phases", PhasesJson(manifest.phases)},
-          {"counters", manifest.counters.empty() ? Json::object() : Json(manifest.counters)}};
+          {"counters", CountersJson(manifest.counters)},
+          {"skip", SkipJson(manifest.counters)}};
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/artifact/skip.h"
 #include "core/base/status.h"
 #include "core/scene/scene.h"
 
@@ -32,6 +33,7 @@ struct BakeSettings {
   int photon_batches = 8;      // tasks the photons are split into; does not change any byte
   float albedo_limit = 0.98f;  // theory.md 1
   uint32_t seed = 0;
+  SkipSet no_skip;                         // what is computed although it seems not to matter
   std::optional<Environment> environment;  // replaces the scene's
 };
 

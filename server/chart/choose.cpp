@@ -28,7 +28,7 @@ bool HasOwnCharts(const Scene& scene) {
 int PageSideForDensity(const Scene& scene, float texels_per_metre) {
   double world_area = 0, uv_area = 0;
   for (const Object& object : scene.objects) {
-    if (!object.lightmapped) continue;
+    if (!object.lightmapped || object.uv1.size() != object.position.size()) continue;  // KeepCharts refuses it
     for (size_t i = 0; i + 2 < object.index.size(); i += 3) {
       const uint32_t a = object.index[i], b = object.index[i + 1], c = object.index[i + 2];
       world_area += Length(

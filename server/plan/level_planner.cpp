@@ -59,11 +59,15 @@ std::string SettingsFor(const KindName& kind, BakeSettings settings) {
   settings.uv = defaults.uv;
   settings.resolution = defaults.resolution;
   settings.texels_per_metre = defaults.texels_per_metre;
-  if (kind.kind == level_task::kReport.kind) return SettingsJson(defaults);
+  if (kind.kind == level_task::kReport.kind) {
+    BakeSettings counted;
+    counted.no_skip = settings.no_skip;
+    return SettingsJson(counted);
+  }
   if (kind.kind == level_task::kGather.kind) return SettingsJson(settings);
-  const bool filters = kind.kind == level_task::kFinish.kind;
-  settings.filter = filters ? settings.filter : defaults.filter;
-  settings.target_error = defaults.target_error;
+  const bool finishes = kind.kind == level_task::kFinish.kind;
+  settings.filter = finishes ? settings.filter : defaults.filter;
+  if (!finishes) settings.target_error = defaults.target_error;
   settings.min_samples = defaults.min_samples;
   settings.max_samples = defaults.max_samples;
   return SettingsJson(settings);

@@ -8,10 +8,12 @@
 #include "client/cli/cli.h"
 #include "client/local/bake.h"
 #include "core/artifact/atomic_file.h"
+#include "core/artifact/manifest.h"
 #include "tests/support/bake_scene.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/level_farm.h"
 #include "tests/support/temp_dir.h"
+#include "worker/finish/bands.h"
 #include "worker/level/page_files.h"
 #include "worker/level/report.h"
 
@@ -69,8 +71,9 @@ void ExpectTheBytesOfTheBareKernels(const BakeSettings& settings) {
   PhaseClock clock;
   const auto prepared = PrepareLevel(LoadLevel(kSample).value(), settings, clock, progress);
   ASSERT_TRUE(prepared.ok()) << prepared.status();
-  const auto baked = BakeTexels(*prepared, settings, clock, progress);
+  auto baked = BakeTexels(*prepared, settings, clock, progress);
   ASSERT_TRUE(baked.ok()) << baked.status();
+  const GatherOptions asked = BudgetOf(settings, prepared->texels).gather;
   BakeTally tally;
   tally.Count(baked->counters);
   for (int page = 0; page < static_cast<int>(prepared->texels.pages.size()); ++page) {
@@ -79,6 +82,9 @@ void ExpectTheBytesOfTheBareKernels(const BakeSettings& settings) {
       if (prepared->texels.texels[i].page == page) lights.push_back(baked->lights[i]);
     }
     BakeTally of_page;
+    SkipCount bands;
+    DropBands(prepared->texels, page, asked.target_error, asked.floor_share, baked->lights, bands);
+    of_page.Count(Skip::kShBands, bands);
     of_page.Count(lights, page == 0 ? baked->filter : FilterCounters());
     tally.Add(of_page);
     const auto files = PageFiles(prepared->texels, baked->lights, page);
@@ -88,10 +94,16 @@ void ExpectTheBytesOfTheBareKernels(const BakeSettings& settings) {
     }
   }
 
-  const auto report = tally.Finish({baked->photons, baked->photon_rays, baked->density_rays, baked->cells}, 0);
+  const auto report =
+      tally.Finish({baked->photons, baked->photon_rays, baked->density_rays, baked->cells, {}}, 0, settings.no_skip);
   ASSERT_TRUE(report.ok()) << report.status();
   const Json statistics = TimelessManifest(dir.path() / "out")["statistics"];
-  EXPECT_EQ(statistics["counters"].get<decltype(report->counters)>(), report->counters);
+  Manifest expected;
+  expected.counters = report->counters;
+  const Json written = Json::parse(ManifestJson(expected).value())["statistics"];
+  EXPECT_EQ(statistics["counters"], written["counters"]);
+  EXPECT_EQ(statistics["skip"], written["skip"]);
+  EXPECT_GT(statistics["skip"]["invalid_texels"]["of"], 0);
   EXPECT_EQ(statistics["estimated_error"], report->estimated_error);
   EXPECT_EQ(statistics["photons"], report->photons);
   EXPECT_EQ(statistics["rays"], report->rays);

@@ -25,16 +25,23 @@ LightTree::Place Around(std::span<const Texel> texels) {
 }  // namespace
 
 TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, uint32_t key,
-                       GatherCounters& counters)
+                       float dispensable, GatherCounters& counters)
     : scene_(scene) {
   if (scene.tree.empty() || begin == end) return;
   const std::span<const Texel> texels = std::span(map.texels).subspan(begin, end - begin);
-  if (!scene.lights.emissive().empty()) cut_of_light_.resize(static_cast<size_t>(scene.lights.local_count()));
-  for (const int node : scene.tree.Cut(Around(texels), kMostNodes)) {
+  const int all = scene.lights.local_count();
+  if (!scene.lights.emissive().empty()) cut_of_light_.assign(static_cast<size_t>(all), -1);
+  const LightTree::Place place = Around(texels);
+  const std::vector<int> cut = scene.tree.Cut(place, kMostNodes), kept = scene.tree.Cull(cut, place, dispensable);
+  SkipCount& culled = counters.skip[Skip::kCulledLights];
+  culled.of += all;
+  culled.skipped += all;
+  for (const int node : kept) culled.skipped -= std::ssize(scene.tree.LightsOf(node));
+  for (const int node : kept) {
     for (const int light : scene.tree.LightsOf(node)) {
       if (!cut_of_light_.empty()) cut_of_light_[static_cast<size_t>(light)] = static_cast<int>(cut_.size());
     }
-    cut_.push_back(scene.lights.local_count() < 2 ? Node{node} : Probe(node, texels, map, key, counters));
+    cut_.push_back(all < 2 ? Node{node} : Probe(node, texels, map, key, counters));
   }
 }
 
@@ -92,6 +99,7 @@ LightTree::Pick TileLights::Draw(const Choice& choice, const SurfacePoint& point
 float TileLights::Probability(const Choice& choice, const SurfacePoint& point, int light) const {
   if (choice.empty) return 0;
   const int at = cut_of_light_[static_cast<size_t>(light)];
+  if (at < 0) return 0;
   const float chosen = choice.distribution.Probability(at);
   if (!(chosen > 0)) return 0;
   return chosen * scene_.tree.Probability(cut_[static_cast<size_t>(at)].node, light, {point.position, point.normal});
@@ -136,11 +144,12 @@ class DirectAdder {
 }  // namespace
 
 void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights& lights,
-                  const TileLights::Choice& choice, uint32_t key, uint32_t begin, uint32_t end, Accumulator& sum,
-                  GatherCounters& counters) {
+                  const TileLights::Choice& choice, Distant distant, uint32_t key, uint32_t begin, uint32_t end,
+                  Accumulator& sum, GatherCounters& counters) {
   const SobolSet set(HashCombine(key, 0xd12ec7u)), far_set(HashCombine(key, 0xfa25e7u));
   const EnvironmentLight& sky = scene.lights.environment();
-  const bool sky_sampled = sky.bright() && !sky.smooth();
+  const bool sky_sampled = distant == Distant::kSampled && sky.bright() && !sky.smooth();
+  const size_t suns = distant == Distant::kSampled ? scene.lights.directionals().size() : 0;
   DirectAdder adder(scene, sum, counters);
   for (uint32_t i = begin; i < end; ++i) {
     const SobolPoint u = set.At(i);
@@ -156,8 +165,8 @@ void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const T
       }
     }
     const SobolPoint far = far_set.At(i);
-    const TexelPoint under_sun = scene.lights.directionals().empty() ? point : sampler.AtMirrored(u.Get2(0));
-    for (size_t k = 0; k < scene.lights.directionals().size(); ++k) {
+    const TexelPoint under_sun = suns == 0 ? point : sampler.AtMirrored(u.Get2(0));
+    for (size_t k = 0; k < suns; ++k) {
       const Vec2f shift{UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k))),
                         UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k + 1)))};
       const Vec2f v = far.Get2(0) + (k == 0 ? Vec2f{} : shift);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "worker/gather/accumulate.h"
@@ -12,10 +13,12 @@ namespace bakewell {
 // those that matter to the tile, the others in groups (a cut through the light tree). The chance of each is its
 // unoccluded irradiance at the texel, times how much of it a few probes from the tile's texels saw (never zero for a
 // light that can reach the texel, so that the choice stays unbiased); inside a group the tree goes on.
+// The weakest, which together bring no texel more than `dispensable` [W m^-2, luminance], are left out; emission among
+// them is found by the gather's rays alone.
 class TileLights {
  public:
   TileLights(const GatherScene& scene, const TexelMap& map, uint32_t begin, uint32_t end, uint32_t key,
-             GatherCounters& counters);
+             float dispensable, GatherCounters& counters);
 
   // The distribution for one texel over the nodes of the tile's cut. Empty where no local light can reach it.
   struct Choice {
@@ -40,14 +43,17 @@ class TileLights {
 
   const GatherScene& scene_;
   std::vector<Node> cut_;          // at most kMostNodes
-  std::vector<int> cut_of_light_;  // per local light, where anything emits that rays can meet
+  std::vector<int> cut_of_light_;  // per local light, -1 left out; where anything emits that rays can meet
 };
+
+// Suns, and a sky that is not smooth.
+enum class Distant : uint8_t { kSampled, kUnseen };
 
 // Direct light of one texel from explicitly sampled lights: the local lights (one sample of one light each), every
 // directional light, the sky where it is not smooth. Samples are points [begin, end) of a Sobol set, of `planned` in
 // all.
 void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const TileLights& lights,
-                  const TileLights::Choice& choice, uint32_t key, uint32_t begin, uint32_t end, Accumulator& sum,
-                  GatherCounters& counters);
+                  const TileLights::Choice& choice, Distant distant, uint32_t key, uint32_t begin, uint32_t end,
+                  Accumulator& sum, GatherCounters& counters);
 
 }  // namespace bakewell

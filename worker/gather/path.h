@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/artifact/skip.h"
 #include "worker/light/tree.h"
 #include "worker/photon/cache.h"
 
@@ -16,6 +17,8 @@ struct GatherScene {
 
 struct GatherCounters {
   int64_t gather_rays = 0, shadow_rays = 0, bounce_rays = 0, validity_rays = 0, filter_rays = 0, bad_samples = 0;
+  SkipTally skip;
+  int64_t light_rays() const { return gather_rays + shadow_rays + bounce_rays; }
 };
 
 // Light that one gather ray brings back.

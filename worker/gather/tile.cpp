@@ -1,5 +1,6 @@
 #include "worker/gather/tile.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -7,6 +8,8 @@
 #include "worker/filter/window.h"
 #include "worker/gather/direct.h"
 #include "worker/gather/guide.h"
+#include "worker/gather/noise.h"
+#include "worker/gather/skip.h"
 #include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
@@ -16,10 +19,12 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr double kLeastFall = 0.1, kLeastCorrection = 0.1;
+constexpr float kCulledShare = 0.1f;  // of what is tolerated in the dark
+constexpr uint32_t kAuditSamples = 64;
+constexpr int64_t kWorthLeavingOut = 64;  // texels; fewer cost less than the audit
 
 // Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
-Rgb FoundByGather(const GatherScene& scene, const TileLights& lights, const TileLights::Choice& choice,
+Rgb FoundByGather(const GatherScene& scene, const std::optional<TileLights>& lights, const TileLights::Choice& choice,
                   const SurfacePoint& from, Vec3f dir, float pdf, const Hit& hit) {
   if (!hit) {
     const EnvironmentLight& sky = scene.lights.environment();
@@ -30,7 +35,7 @@ Rgb FoundByGather(const GatherScene& scene, const TileLights& lights, const Tile
   if (light < 0) return {};
   const Rgb emission = scene.world.EmissionAt(hit);
   if (MaxComponent(emission) <= 0) return {};
-  const float chosen = lights.Probability(choice, from, light);
+  const float chosen = lights ? lights->Probability(choice, from, light) : 0;
   const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from.position, dir, hit.t) : 0;
   return emission * PowerHeuristic(pdf, light_pdf);
 }
@@ -43,6 +48,7 @@ struct Work {
   TileLights::Choice choice{};
   uint32_t key = 0;
   bool valid = true;
+  bool dark = false, audited = false;  // to be left out; but computed all the same
   uint8_t open = 0;
   float direct_correction = 1, indirect_correction = 1;  // of the accumulators' variances
   float backs = 0, backface_share = 0;                   // gather rays that met a back face; their share
@@ -62,17 +68,17 @@ class TileGatherer {
                const GatherOptions& options, GatherCounters& counters)
       : scene_(scene), map_(map), begin_(begin), end_(end), options_(options), counters_(counters) {}
 
-  std::vector<TexelLight> Run(const AtlasLayout& layout) {
+  // Nothing where the audit found light that was to be left out.
+  std::optional<std::vector<TexelLight>> Run(const AtlasLayout& layout) {
     Prepare(layout);
-    Round(0, static_cast<uint32_t>(options_.min_samples));
-    for (size_t i = 0; i < work_.size(); ++i) Validate(map_.texels[begin_ + i], work_[i]);
+    if (!FirstRound()) return std::nullopt;
     if (options_.filter) Connect();
-    Correct();
+    CorrectVariances();
     Decide();
     Guide();
     for (int done = options_.min_samples; done < options_.max_samples; done *= 2) {
       if (!Round(static_cast<uint32_t>(done), static_cast<uint32_t>(2 * done))) break;
-      Correct();
+      CorrectVariances();
       Decide();
     }
     std::vector<TexelLight> result;
@@ -82,22 +88,114 @@ class TileGatherer {
 
  private:
   void Prepare(const AtlasLayout& layout) {
-    const uint32_t tile_key = TexelKey(map_.texels[begin_], options_.seed ^ 0x711eu);
-    lights_.emplace(scene_, map_, begin_, end_, tile_key, counters_);
     work_.reserve(end_ - begin_);
     for (uint32_t i = begin_; i < end_; ++i) {
       const Texel& texel = map_.texels[i];
       Work work(TexelSampler(scene_.world, layout, map_, texel));
       work.key = TexelKey(texel, options_.seed);
-      work.choice = lights_->ForTexel(texel, work.sampler.radius());
-      if (NoExplicitLight(work)) work.direct_active = false;
       work_.push_back(std::move(work));
+    }
+    if (lit_ ? Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) LeaveOutDark();
+    for (size_t i = 0; i < work_.size(); ++i) {
+      if (work_[i].direct_active) ChooseLights(map_.texels[begin_ + i], work_[i].sampler.radius(), work_[i]);
     }
   }
 
-  bool NoExplicitLight(const Work& work) const {
-    const EnvironmentLight& sky = scene_.lights.environment();
-    return work.choice.empty && scene_.lights.directionals().empty() && (!sky.bright() || sky.smooth());
+  void ChooseLights(const Texel& texel, float radius, Work& work) {
+    if (!lights_) {
+      const uint32_t tile_key = TexelKey(map_.texels[begin_], options_.seed ^ 0x711eu);
+      const float dispensable = Skips(Skip::kCulledLights) ? kCulledShare * Tolerated(0) : -1;
+      lights_.emplace(scene_, map_, begin_, end_, tile_key, dispensable, counters_);
+    }
+    work.choice = lights_->ForTexel(texel, radius);
+    work.direct_active = !work.choice.empty || scene_.lights.samples_distant();
+  }
+
+  bool Skips(Skip skip) const { return !options_.no_skip.Has(skip); }
+
+  // Texels that no light reaches, but for those that are audited.
+  void LeaveOutDark() {
+    const PhotonDarkness darkness(scene_.cells, scene_.cache, Tolerated(0), options_.photon_flux);
+    std::vector<bool> dark;
+    for (const Work& work : work_) dark.push_back(!lit_ || darkness.Covers(work.sampler));
+    const std::vector<bool> audited = DrawAudit(Keys(), dark);
+    for (size_t i = 0; i < work_.size(); ++i) {
+      work_[i].dark = dark[i];
+      work_[i].audited = lit_ && audited[i];
+      if (dark[i] && !work_[i].audited) work_[i].direct_active = work_[i].indirect_active = false;
+    }
+  }
+
+  std::vector<uint32_t> Keys() const {
+    std::vector<uint32_t> keys;
+    for (const Work& work : work_) keys.push_back(work.key);
+    return keys;
+  }
+
+  // What errors in this irradiance are measured in: between equal absolute and equal relative errors, for what matters
+  // to the root mean square and to the eye.
+  float Weighing(float irradiance) const {
+    const float mean = options_.mean_irradiance;
+    return std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
+  }
+  float Tolerated(float irradiance) const { return options_.target_error * Weighing(irradiance); }
+
+  // Rays over the hemisphere, which also say which texels are valid and whether the tile sees the sky; then lights.
+  // False where texels that were to be left out have light.
+  bool FirstRound() {
+    const uint32_t samples = static_cast<uint32_t>(options_.min_samples);
+    SkipAudit audit;
+    std::vector<int64_t> rays;
+    for (size_t i = 0; i < work_.size(); ++i) {
+      rays.push_back(-counters_.light_rays());
+      if (work_[i].indirect_active) IndirectRound(work_[i], 0, samples);
+      Validate(map_.texels[begin_ + i], work_[i]);
+      rays.back() += counters_.light_rays();
+    }
+    if (Skips(Skip::kUnseenSky)) LeaveOutSky();
+    for (size_t i = 0; i < work_.size(); ++i) {
+      Work& work = work_[i];
+      rays[i] -= counters_.light_rays();
+      if (work.direct_active) DirectRound(work, 0, samples);
+      rays[i] += counters_.light_rays();
+      const float found = Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance());
+      if (work.audited && work.valid) audit.Found(found, Tolerated(found), options_.mean_irradiance, rays[i]);
+    }
+    audit.Count(counters_.skip);
+    if (audit.passes()) CountDark(audit);
+    return audit.passes();
+  }
+
+  void CountDark(const SkipAudit& audit) {
+    int64_t dark = 0;
+    for (const Work& work : work_) dark += work.dark && !work.audited ? 1 : 0;
+    const int64_t full = lit_ ? audit.RaysOf(dark) : dark * options_.min_samples;
+    counters_.skip[lit_ ? Skip::kDarkCharts : Skip::kNoLight].Add(
+        {dark, std::ssize(work_), std::max<int64_t>(0, full - dark * kValidityFirstRays)});
+  }
+
+  // Suns and sky, where no gather ray of the tile escaped and more samples of a few texels see none of them.
+  void LeaveOutSky() {
+    if (!scene_.lights.samples_distant()) return;
+    std::vector<bool> looking;
+    for (const Work& work : work_) looking.push_back(work.direct_active);
+    const int64_t texels = std::count(looking.begin(), looking.end(), true);
+    counters_.skip[Skip::kUnseenSky].of += texels;
+    if (escaped_ > 0 || texels < kWorthLeavingOut) return;
+    const std::vector<bool> audited = DrawAudit(Keys(), looking);
+    SkipAudit audit;
+    for (size_t i = 0; i < work_.size(); ++i) {
+      if (!audited[i]) continue;
+      Accumulator lost;
+      GatherDirect(scene_, work_[i].sampler, *lights_, {}, Distant::kSampled, HashCombine(work_[i].key, 0x5c1u), 0,
+                   kAuditSamples, lost, counters_);
+      const float found = Luminance(lost.Irradiance());
+      audit.Found(found, Tolerated(found), options_.mean_irradiance, 0);
+    }
+    audit.Count(counters_.skip);
+    if (!audit.passes()) return;
+    distant_ = Distant::kUnseen;
+    counters_.skip[Skip::kUnseenSky].skipped += texels;
   }
 
   // The first round's rays guide the others.
@@ -119,34 +217,49 @@ class TileGatherer {
   }
 
   bool RoundOf(Work& work, uint32_t done, uint32_t planned) {
-    if (work.direct_active) {
-      if (done > 0) work.direct.Double();
-      GatherDirect(scene_, work.sampler, *lights_, work.choice, work.key, done, planned, work.direct, counters_);
-      work.direct_samples = static_cast<int>(planned);
-    }
-    if (work.indirect_active) {
-      if (done > 0) work.indirect.Double();
-      GatherIndirect(work, done, planned);
-      work.indirect_samples = static_cast<int>(planned);
-    }
+    if (work.direct_active) DirectRound(work, done, planned);
+    if (work.indirect_active) IndirectRound(work, done, planned);
     return work.direct_active || work.indirect_active;
+  }
+
+  void DirectRound(Work& work, uint32_t done, uint32_t planned) {
+    if (done > 0) work.direct.Double();
+    GatherDirect(scene_, work.sampler, *lights_, work.choice, distant_, work.key, done, planned, work.direct,
+                 counters_);
+    if (distant_ == Distant::kUnseen) counters_.skip[Skip::kUnseenSky].saved += planned - done;
+    work.direct_samples = static_cast<int>(planned);
+  }
+
+  void IndirectRound(Work& work, uint32_t done, uint32_t planned) {
+    if (done > 0) work.indirect.Double();
+    GatherIndirect(work, done, planned);
+    work.indirect_samples = static_cast<int>(planned);
   }
 
   // The first round's rays say how much of the hemisphere meets back faces. A texel that turns out to lie partly or
   // wholly inside other geometry starts again from its valid parts, or not at all.
   void Validate(const Texel& texel, Work& work) {
+    const std::optional<float> backs =
+        work.indirect.count() > 0 ? std::optional(work.backs / work.indirect.count()) : std::nullopt;
     const TexelValidity validity =
-        ProbeValidity(scene_.world, work.key, work.backs / work.indirect.count(), work.sampler);
+        ProbeValidity(scene_.world, work.key, backs, Skips(Skip::kInvalidTexels) ? PartSearch::kNear : PartSearch::kAll,
+                      work.sampler);
     counters_.validity_rays += validity.rays;
+    counters_.skip[Skip::kInvalidTexels].Add({validity.rays_saved > 0 ? 1 : 0, 1, validity.rays_saved});
     work.valid = validity.valid;
     work.backface_share = validity.backface_share;
     if (!work.valid) work.direct_active = work.indirect_active = false;
     if (work.valid && !validity.pushed_out && work.sampler.valid_mask() == 0xffff) return;
-    work.direct = work.indirect = {};
+    work.indirect = {};
     work.group = {};
-    // A texel that was pushed out lies up to its diagonal away.
-    if (validity.pushed_out) work.choice = lights_->ForTexel(texel, 3 * work.sampler.radius());
-    if (work.valid) RoundOf(work, 0, static_cast<uint32_t>(options_.min_samples));
+    if (!work.valid) return;
+    // A texel that was pushed out lies up to its diagonal away, where other light comes.
+    if (validity.pushed_out) {
+      work.dark = work.audited = false;
+      work.indirect_active = true;
+      ChooseLights(texel, 3 * work.sampler.radius(), work);
+    }
+    if (work.indirect_active) IndirectRound(work, 0, static_cast<uint32_t>(options_.min_samples));
   }
 
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
@@ -164,7 +277,8 @@ class TileGatherer {
       ++counters_.gather_rays;
       const Hit hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, ray_key));
       work.backs += MeetsBack(scene_.world, hit) ? 1.0f : 0.0f;
-      Rgb radiance = FoundByGather(scene_, *lights_, work.choice, point.surface, dir, pdf, hit);
+      escaped_ += hit ? 0 : 1;
+      Rgb radiance = FoundByGather(scene_, lights_, work.choice, point.surface, dir, pdf, hit);
       if (hit) {
         const GatheredRadiance reflected = ReflectedRadiance(scene_, hit, ray_key, counters_);
         radiance += reflected.radiance;
@@ -273,45 +387,18 @@ class TileGatherer {
     }
   }
 
-  using Part = Accumulator Work::*;
-
-  // By what the spread of blocks overstates the variance of an estimator's whole sets, over the texels that took part
-  // in the last round: points of one Sobol set repel one another, the more the smoother what they sample. Each doubling
-  // took something off the variance; the doublings still to come would take off the rest, and fall as the last ones
-  // did.
-  float Overstatement(Part part, bool Work::*active) const {
-    std::array<double, 3> halving{};
-    double variance = 0;
+  // How far the sets that took part in the last round are better than their blocks say.
+  void CorrectVariances() {
+    SetNoise direct, indirect;
     for (const Work& work : work_) {
-      if (!work.valid || !(work.*active)) continue;
-      const Accumulator& sums = work.*part;
-      const float tolerated = Tolerated(Luminance(sums.Irradiance()));
-      if (!(tolerated > 0)) continue;
-      const double weight = 1 / (static_cast<double>(tolerated) * static_cast<double>(tolerated));
-      const std::array<double, 3> halvings = sums.Halvings();
-      for (size_t k = 0; k < halving.size(); ++k) halving[k] += halvings[k] * weight;
-      variance += static_cast<double>(Luminance(sums.Variance())) * weight;
+      if (!work.valid) continue;
+      if (work.direct_active) direct.Add(work.direct, Weighing(Luminance(work.direct.Irradiance())));
+      if (work.indirect_active) indirect.Add(work.indirect, Weighing(Luminance(work.indirect.Irradiance())));
     }
-    if (!(variance > 0) || !(halving[2] > 0)) return 1;
-    // Per doubling; 1/2 for independent samples.
-    const double fall = std::clamp(std::sqrt(halving[0] / halving[2]), kLeastFall, 0.5);
-    return static_cast<float>(std::clamp(halving[0] * fall / (1 - fall) / variance, kLeastCorrection, 1.0));
-  }
-
-  void Correct() {
-    const float direct = Overstatement(&Work::direct, &Work::direct_active);
-    const float indirect = Overstatement(&Work::indirect, &Work::indirect_active);
     for (Work& work : work_) {
-      if (work.direct_active) work.direct_correction = direct;
-      if (work.indirect_active) work.indirect_correction = indirect;
+      if (work.direct_active) work.direct_correction = direct.Correction();
+      if (work.indirect_active) work.indirect_correction = indirect.Correction();
     }
-  }
-
-  // What an error in this irradiance weighs: between equal absolute and equal relative errors, for what matters to the
-  // root mean square and to the eye.
-  float Tolerated(float irradiance) const {
-    const float mean = options_.mean_irradiance;
-    return std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
   }
 
   // Switches off the estimators that meet their half of the target.
@@ -326,7 +413,7 @@ class TileGatherer {
       // A stray sample must not raise its own tolerance: the smoothed light judges where there is one.
       const float indirect = options_.filter ? smooth[i].value : Luminance(work.indirect.Irradiance());
       const float irradiance = Luminance(work.direct.Irradiance()) + indirect;
-      const float scale = options_.target_error * Tolerated(irradiance);
+      const float scale = Tolerated(irradiance);
       const float budget = 0.5f * scale * scale;
       active[i] = {work.direct_active && PooledVariance(i, [](const Work& w) { return w.DirectVariance(); }) > budget,
                    work.indirect_active && (!options_.filter || smooth[i].variance > budget) &&
@@ -377,6 +464,9 @@ class TileGatherer {
   GatherCounters& counters_;
   std::optional<TileLights> lights_;
   std::optional<FoundLight> found_{std::in_place};
+  const bool lit_ = !scene_.tree.empty() || scene_.lights.environment().bright() || scene_.lights.samples_distant();
+  int64_t escaped_ = 0;  // gather rays
+  Distant distant_ = Distant::kSampled;
   SmoothGrid grid_{kTileSide + 2 * SmoothGrid::kMostRadius, kTileSide + 2 * SmoothGrid::kMostRadius};
   int left_ = 0, top_ = 0;  // of the grid, on the page
   std::vector<Work> work_;
@@ -391,7 +481,12 @@ uint32_t TexelKey(const Texel& texel, uint32_t seed) {
 
 std::vector<TexelLight> GatherTile(const GatherScene& scene, const AtlasLayout& layout, const TexelMap& map, int tile,
                                    const GatherOptions& options, GatherCounters& counters) {
-  return TileGatherer(scene, map, map.tile_begin[tile], map.tile_begin[tile + 1], options, counters).Run(layout);
+  const uint32_t begin = map.tile_begin[tile], end = map.tile_begin[tile + 1];
+  auto lights = TileGatherer(scene, map, begin, end, options, counters).Run(layout);
+  if (lights) return *std::move(lights);
+  GatherOptions full = options;
+  full.no_skip.Add(Skip::kDarkCharts);
+  return *TileGatherer(scene, map, begin, end, full, counters).Run(layout);
 }
 
 }  // namespace bakewell

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "core/artifact/skip.h"
 #include "core/atlas/layout.h"
 #include "core/sh/sh.h"
 #include "worker/gather/path.h"
@@ -17,6 +18,8 @@ struct GatherOptions {
   float floor_share = 0.25f;
   float mean_irradiance = 0;  // luminance, of the whole bake, as the photons saw it [W m^-2]
   uint32_t seed = 0;
+  float photon_flux = 0;  // MeanPhotonFlux
+  SkipSet no_skip;
   bool filter = true;  // the page will be filtered: the gather may stop where that brings its part to the target
 };
 

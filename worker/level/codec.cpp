@@ -25,6 +25,12 @@ class NumberReader {
     at_ += sizeof(T);
     return value;
   }
+  std::string_view Take(size_t bytes) {
+    ok_ = ok_ && remaining() >= bytes;
+    if (!ok_) return {};
+    at_ += bytes;
+    return {at_ - bytes, bytes};
+  }
   size_t remaining() const { return static_cast<size_t>(end_ - at_); }
   bool ok() const { return ok_; }
   absl::Status Finish(const char* what) const {
@@ -207,6 +213,7 @@ GatheredTiles Joined(std::span<const GatheredTiles> parts) {
     all.counters.validity_rays += part.counters.validity_rays;
     all.counters.filter_rays += part.counters.filter_rays;
     all.counters.bad_samples += part.counters.bad_samples;
+    all.counters.skip.Add(part.counters.skip);
   }
   return all;
 }
@@ -218,6 +225,7 @@ std::string SerializeTiles(const GatheredTiles& tiles) {
                               counters.filter_rays, counters.bad_samples}) {
     Put(value, writer);
   }
+  writer.PutString(Serialize(counters.skip));
   writer.Put(static_cast<uint64_t>(tiles.lights.size()));
   for (const TexelLight& light : tiles.lights) PutTexel(light, writer);
   return std::move(writer).bytes();
@@ -231,6 +239,7 @@ absl::StatusOr<GatheredTiles> ParseTiles(std::string_view bytes) {
                          &counters.filter_rays, &counters.bad_samples}) {
     Get(reader, *value);
   }
+  BAKEWELL_ASSIGN_OR_RETURN(counters.skip, ParseSkipTally(reader.Take(reader.Get<uint32_t>())));
   const uint64_t count = reader.Get<uint64_t>();
   if (count > reader.remaining() / kTexelBytes) return absl::DataLossError("gathered tiles: impossible count");
   tiles.lights.reserve(count);

@@ -7,6 +7,7 @@
 #include "core/atlas/serialize.h"
 #include "core/scene/canonical.h"
 #include "proto/settings.h"
+#include "worker/finish/bands.h"
 #include "worker/finish/filter.h"
 #include "worker/level/codec.h"
 #include "worker/level/page_files.h"
@@ -138,6 +139,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
   survey.texels = map.texels.size();
   survey.photons = static_cast<uint64_t>(level->photons);
   survey.overlapping_texels = static_cast<uint64_t>(map.overlapping_texels);
+  survey.opaque_alpha = level->world->opaque_alpha();
   survey.tile_end_of_page.assign(map.pages.size(), 0);
   for (int tile = 0; tile < map.tile_count(); ++tile) {
     const uint32_t begin = map.tile_begin[tile], end = map.tile_begin[tile + 1];
@@ -179,9 +181,11 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Density(const Work& work) {
   map.flux.resize(2 * stage->cells.cells().size());
   for (const Blob& flux : InputsNamed(work.inputs, "flux")) BAKEWELL_RETURN_IF_ERROR(AddPhotons(*flux, map));
   RadianceCache cache;
-  InArena([&] { cache = EstimateDensity(*level->world, stage->cells, map, stage->plan, {}, progress); });
+  InArena([&] {
+    cache = EstimateDensity(*level->world, stage->cells, map, stage->plan, DensityOf(work.settings), progress);
+  });
   const level_task::PhotonCounts totals{stage->plan.photons, map.totals.rays, cache.rays,
-                                        std::ssize(stage->cells.cells())};
+                                        std::ssize(stage->cells.cells()), cache.unfaced_backs};
   return MadeOutputs{{"cache", SerializeCache(cache)}, {"totals", level_task::Serialize(totals)}};
 }
 
@@ -197,12 +201,14 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
       return absl::InvalidArgumentError("the radiance cache is of other cells");
     }
     made->mean_irradiance = MeanIrradiance(level->texels, stage->cells, made->cache);
+    made->photon_flux = MeanPhotonFlux(stage->cells, made->cache);
     return made;
   }));
   const LightTree tree(*level->lights);
   const GatherScene scene{*level->world, *level->lights, tree, stage->cells, photons->cache};
   GatherOptions options = BudgetOf(work.settings, level->texels).gather;
   options.mean_irradiance = photons->mean_irradiance;
+  options.photon_flux = photons->photon_flux;
   const int all = level->texels.tile_count(), end = static_cast<int>(std::min<int64_t>(work.range.end, all));
   const int begin = static_cast<int>(std::min<int64_t>(work.range.begin, end));
   std::vector<GatheredTiles> made(static_cast<size_t>(end - begin));
@@ -237,6 +243,12 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
   }
   FilterCounters filtered;
   if (Filters(work.settings)) InArena([&] { FilterPage(level->texels, page, lights, filtered); });
+  if (!work.settings.no_skip.Has(Skip::kShBands)) {
+    const GatherOptions asked = BudgetOf(work.settings, level->texels).gather;
+    SkipCount dropped;
+    DropBands(level->texels, page, asked.target_error, asked.floor_share, lights, dropped);
+    tally.Count(Skip::kShBands, dropped);
+  }
   tally.Count(std::span(lights).subspan(first, next - first), filtered);
   BAKEWELL_ASSIGN_OR_RETURN(MadeOutputs outputs, PageFiles(level->texels, lights, page));
   outputs.push_back({"tally", tally.Serialize()});
@@ -250,12 +262,15 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Report(const Work& work) {
   BAKEWELL_ASSIGN_OR_RETURN(const Blob totals_bytes, FindInput(work.inputs, "totals"));
   BAKEWELL_ASSIGN_OR_RETURN(const level_task::PhotonCounts photons, level_task::ParsePhotonCounts(*totals_bytes));
   BakeTally tally;
+  tally.Count(Skip::kUnfacedBacks, photons.unfaced_backs);
+  tally.Count(Skip::kOpaqueAlpha, survey.opaque_alpha);
   for (const Blob& blob : InputsNamed(work.inputs, "tally")) {
     BAKEWELL_ASSIGN_OR_RETURN(const BakeTally page, BakeTally::Parse(*blob));
     tally.Add(page);
   }
-  BAKEWELL_ASSIGN_OR_RETURN(const BakeReport report,
-                            tally.Finish(photons, static_cast<int64_t>(survey.overlapping_texels)));
+  BAKEWELL_ASSIGN_OR_RETURN(
+      const BakeReport report,
+      tally.Finish(photons, static_cast<int64_t>(survey.overlapping_texels), work.settings.no_skip));
   return MadeOutputs{{level_task::kReportArtifact, ReportJson(report)}};
 }
 

@@ -37,7 +37,7 @@ class LevelExecutor final : public TaskExecutor {
   // The radiance cache with what follows from it.
   struct Photons {
     RadianceCache cache;
-    float mean_irradiance = 0;
+    float mean_irradiance = 0, photon_flux = 0;
   };
   absl::StatusOr<std::shared_ptr<const Level>> LevelOf(const Work& work);
   absl::StatusOr<std::shared_ptr<const PhotonStage>> PhotonStageOf(const Work& work, const Level& level);

@@ -38,6 +38,10 @@ int64_t CellsFor(int64_t photons) {
 
 bool Filters(const BakeSettings& settings) { return settings.filter && settings.quality != Quality::kHigh; }
 
+DensityOptions DensityOf(const BakeSettings& settings) {
+  return {.probe_unlit = settings.no_skip.Has(Skip::kUnfacedBacks)};
+}
+
 Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
   const QualityNumbers numbers = NumbersOf(settings.quality);
   Budget budget;
@@ -47,6 +51,7 @@ Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
   budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
   budget.gather.seed = settings.seed;
   budget.gather.filter = Filters(settings);
+  budget.gather.no_skip = settings.no_skip;
   const int64_t texel_count = static_cast<int64_t>(texels.texels.size());
   budget.photons =
       settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texel_count * numbers.photons_per_texel);
@@ -58,7 +63,8 @@ absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout
   auto level = std::make_shared<Level>();
   level->scene = std::move(scene);
   level->layout = std::move(layout);
-  BAKEWELL_ASSIGN_OR_RETURN(level->world, World::Build(level->scene, settings.backfaces, settings.albedo_limit));
+  BAKEWELL_ASSIGN_OR_RETURN(level->world,
+                            World::Build(level->scene, settings.backfaces, settings.albedo_limit, settings.no_skip));
   level->lights = std::make_unique<LightSet>(*level->world, level->scene.environment);
   level->texels = RasterizeTexels(*level->world, level->layout, settings.footprint);
   if (level->texels.texels.empty()) {

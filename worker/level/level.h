@@ -8,6 +8,7 @@
 
 #include "core/artifact/settings.h"
 #include "core/base/fields.h"
+#include "worker/gather/skip.h"
 #include "worker/gather/tile.h"
 #include "worker/light/tree.h"
 
@@ -21,6 +22,9 @@ struct Budget {
 // Whether indirect light is filtered: at high quality there is little noise that a filter could take for nothing
 // (worker/filter/README.md).
 bool Filters(const BakeSettings& settings);
+
+// How the photons' density is estimated.
+DensityOptions DensityOf(const BakeSettings& settings);
 
 Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels);
 

@@ -33,6 +33,7 @@ void BakeTally::Add(const BakeTally& page) {
   BakeTally other = page;
   const auto to = Integers(), from = other.Integers();
   for (size_t i = 0; i < to.size(); ++i) *to[i] += *from[i];
+  counters_.skip.Add(other.counters_.skip);
   variance_ += other.variance_;
   irradiance_ += other.irradiance_;
 }
@@ -42,6 +43,7 @@ std::string BakeTally::Serialize() const {
   FieldWriter writer;
   for (const int64_t* value : copy.Integers()) writer.Put(static_cast<uint64_t>(*value));
   for (const double value : {variance_, irradiance_}) writer.Put(std::bit_cast<uint64_t>(value));
+  writer.PutString(bakewell::Serialize(counters_.skip));
   return std::move(writer).bytes();
 }
 
@@ -50,7 +52,9 @@ absl::StatusOr<BakeTally> BakeTally::Parse(std::string_view bytes) {
   BakeTally tally;
   for (int64_t* value : tally.Integers()) *value = static_cast<int64_t>(reader.Get<uint64_t>());
   for (double* value : {&tally.variance_, &tally.irradiance_}) *value = std::bit_cast<double>(reader.Get<uint64_t>());
+  const std::string skip = reader.GetString();
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("tally"));
+  BAKEWELL_ASSIGN_OR_RETURN(tally.counters_.skip, ParseSkipTally(skip));
   return tally;
 }
 
@@ -61,6 +65,7 @@ void BakeTally::Count(const GatherCounters& counters) {
   counters_.validity_rays += counters.validity_rays;
   counters_.filter_rays += counters.filter_rays;
   counters_.bad_samples += counters.bad_samples;
+  counters_.skip.Add(counters.skip);
 }
 
 void BakeTally::Count(std::span<const TexelLight> lights, const FilterCounters& filter) {
@@ -84,8 +89,28 @@ double BakeTally::EstimatedError() const {
   return irradiance_ > 0 ? std::sqrt(variance_ / count) / (irradiance_ / count) : 0;
 }
 
-absl::StatusOr<BakeReport> BakeTally::Finish(const level_task::PhotonCounts& photons,
-                                             int64_t overlapping_texels) const {
+namespace {
+
+void CountSkips(const SkipTally& tally, const SkipSet& no_skip, std::map<std::string, int64_t>& counters) {
+  for (size_t i = 0; i < kSkipNames.size(); ++i) {
+    const std::string name = absl::StrCat("skip/", kSkipNames[i], "/");
+    counters[name + "enabled"] = no_skip.Has(static_cast<Skip>(i)) ? 0 : 1;
+    counters[name + "skipped"] = tally.kind[i].skipped;
+    counters[name + "of"] = tally.kind[i].of;
+    counters[name + "saved"] = tally.kind[i].saved;
+  }
+  const double square = static_cast<double>(tally.square_ppm2) / std::max(1.0, static_cast<double>(tally.audited));
+  counters["skip/audit/texels"] = tally.audited;
+  counters["skip/audit/failed_over"] = tally.failed_over;
+  counters["skip/audit/found_ppm"] = tally.found_ppm;
+  counters["skip/audit/largest_ppm"] = tally.largest_ppm;
+  counters["skip/audit/rms_ppm"] = std::llround(std::sqrt(square));
+}
+
+}  // namespace
+
+absl::StatusOr<BakeReport> BakeTally::Finish(const level_task::PhotonCounts& photons, int64_t overlapping_texels,
+                                             const SkipSet& no_skip) const {
   const double samples = static_cast<double>(counters_.gather_rays + counters_.shadow_rays);
   if (static_cast<double>(counters_.bad_samples) > kMostBadSamples * samples) {
     return absl::InvalidArgumentError(
@@ -107,6 +132,7 @@ absl::StatusOr<BakeReport> BakeTally::Finish(const level_task::PhotonCounts& pho
                      {"gather/shadow_rays", counters_.shadow_rays},
                      {"gather/bounce_rays", counters_.bounce_rays},
                      {"gather/bad_samples", counters_.bad_samples}};
+  CountSkips(counters_.skip, no_skip, report.counters);
   report.photons = photons.photons;
   report.rays = photons.photon_rays + photons.density_rays + counters_.gather_rays + counters_.shadow_rays +
                 counters_.bounce_rays + counters_.validity_rays + counters_.filter_rays;

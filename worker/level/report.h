@@ -19,12 +19,14 @@ class BakeTally {
   void Count(const GatherCounters& counters);
   // The final texels of a page, in the order of TexelMap::texels.
   void Count(std::span<const TexelLight> lights, const FilterCounters& filter);
+  void Count(Skip skip, const SkipCount& count) { counters_.skip[skip] = count; }
   void Add(const BakeTally& page);
   // Canonical bytes and back; the parser is safe on hostile bytes (kDataLoss).
   std::string Serialize() const;
   static absl::StatusOr<BakeTally> Parse(std::string_view bytes);
   // kInvalidArgument: more samples than one in a million were NaN or infinite.
-  absl::StatusOr<BakeReport> Finish(const level_task::PhotonCounts& photons, int64_t overlapping_texels) const;
+  absl::StatusOr<BakeReport> Finish(const level_task::PhotonCounts& photons, int64_t overlapping_texels,
+                                    const SkipSet& no_skip) const;
 
  private:
   double EstimatedError() const;

@@ -37,6 +37,8 @@ class LightSet {
   const std::vector<EmissiveTriangle>& emissive() const { return emissive_; }
   const EnvironmentLight& environment() const { return environment_; }
   const World& world() const { return world_; }
+  // Directional lights, or a sky that is not smooth.
+  bool samples_distant() const { return !directionals_.empty() || (environment_.bright() && !environment_.smooth()); }
   bool IsEmissive(int light) const { return light >= static_cast<int>(locals_.size()); }
 
   // The local light of an emissive triangle, or -1. Triangles that coincide are one light.

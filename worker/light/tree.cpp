@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <queue>
 #include <tuple>
@@ -170,6 +171,35 @@ float LightTree::Importance(int node, const Place& place) const {
   const float beyond = AngleBetween(n.axis, -dir) - spread;
   if (beyond >= n.cone_rad) return 0;
   return n.intensity * cosine / distance2;
+}
+
+float LightTree::Bound(int node, const Place& place) const {
+  const Node& n = nodes_[static_cast<size_t>(node)];
+  const Vec3f to_light = n.center - place.position;
+  const float reach = n.radius + place.radius, distance = Length(to_light);
+  const float least = distance * (1 - 1e-5f) - reach;
+  if (!(least > 0)) return std::numeric_limits<float>::infinity();
+  const float spread = std::asin(std::min(1.0f, reach / distance)) + kSlackRad;
+  if (AngleBetween(n.axis, -to_light / distance) - spread >= n.cone_rad) return 0;
+  return n.intensity / (least * least);
+}
+
+std::vector<int> LightTree::Cull(std::span<const int> cut, const Place& place, float dispensable) const {
+  std::vector<std::pair<float, int>> weakest;
+  for (const int node : cut) weakest.push_back({Bound(node, place), node});
+  std::sort(weakest.begin(), weakest.end());
+  double sum = 0;
+  std::vector<int> culled, kept;
+  for (const auto& [bound, node] : weakest) {
+    sum += static_cast<double>(bound);
+    if (sum > static_cast<double>(dispensable)) break;
+    culled.push_back(node);
+  }
+  std::sort(culled.begin(), culled.end());
+  for (const int node : cut) {
+    if (!std::binary_search(culled.begin(), culled.end(), node)) kept.push_back(node);
+  }
+  return kept;
 }
 
 LightTree::Pick LightTree::Draw(int node, const Place& place, float u) const {

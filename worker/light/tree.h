@@ -38,6 +38,11 @@ class LightTree {
   // Nodes that hold every light once, at most `most` of them, split where their light at the place is strongest; by the
   // first light that they hold.
   std::vector<int> Cut(const Place& place, size_t most) const;
+  // At least the unoccluded irradiance (luminance) that a node's lights bring together to any point of a place,
+  // whichever way it faces: intensity over the square of the least distance, nothing from behind their cones.
+  float Bound(int node, const Place& place) const;
+  // The nodes of `cut` without the weakest, whose bounds together stay within `dispensable`.
+  std::vector<int> Cull(std::span<const int> cut, const Place& place, float dispensable) const;
   // All lights of a node.
   std::span<const int> LightsOf(int node) const;
   bool IsLeaf(int node) const { return nodes_[static_cast<size_t>(node)].left < 0; }

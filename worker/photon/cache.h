@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/artifact/progress.h"
+#include "core/artifact/skip.h"
 #include "worker/photon/emit.h"
 
 namespace bakewell {
@@ -25,11 +26,13 @@ struct RadianceCache {
   float cell_size_m = 1;
   int64_t photons_seen = 0;
   int64_t rays = 0;
+  SkipCount unfaced_backs;  // sides of cells whose patch no photon met, of those with surface; rays
 };
 
 struct DensityOptions {
-  int target_count = 24;  // photons a neighbourhood should hold
-  int max_radius = 3;     // cells
+  int target_count = 24;     // photons a neighbourhood should hold
+  int max_radius = 3;        // cells
+  bool probe_unlit = false;  // search the neighbourhoods of sides that no photon met as well
 };
 
 // E ~ sum of flux / sum of exact area over the smallest square neighbourhood that holds target_count photons and that

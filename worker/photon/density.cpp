@@ -34,6 +34,7 @@ class Estimator {
     ForEachPatch([this](const CellPatch& patch) { AveragePatch(patch); });
     progress.Report("density", 2, 2);
     cache_.rays = rays_.load();
+    cache_.unfaced_backs = {unprobed_.load(), sides_.load(), unprobed_.load() * std::ssize(kSteps)};
     for (const CellFlux& flux : map_.flux) cache_.photons_seen += flux.count;
     return std::move(cache_);
   }
@@ -69,11 +70,17 @@ class Estimator {
 
   void ProbePatch(const CellPatch& patch) {
     for (int side = 0; side < 2; ++side) {
-      if (!Lit(patch, side)) continue;
+      const bool lit = Lit(patch, side);
       for (int y = 0; y < patch.height; ++y) {
         for (int x = 0; x < patch.width; ++x) {
           const size_t i = Index(patch, x, y, side);
-          if (cells_.cells()[i / 2].area > 0) Probe(patch, i, side, x, y);
+          if (cells_.cells()[i / 2].area <= 0) continue;
+          ++sides_;
+          if (lit || options_.probe_unlit) {
+            Probe(patch, i, side, x, y);
+          } else {
+            ++unprobed_;
+          }
         }
       }
     }
@@ -205,7 +212,7 @@ class Estimator {
   RadianceCache cache_;
   std::vector<uint8_t> open_;  // per side: bit k, the way to neighbour kSteps[k] is free
   std::vector<uint8_t> cut_;   // per side: 1 where other geometry runs through the cell
-  std::atomic<int64_t> rays_{0};
+  std::atomic<int64_t> rays_{0}, sides_{0}, unprobed_{0};
 };
 
 }  // namespace

@@ -9,7 +9,8 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr int kFirstRays = 8, kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
+constexpr float kInsideShare = 0.9f;  // of back faces: the texel is inside as a whole, if nothing divides it
+constexpr int kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
 
 // Share of `count` cosine-weighted rays that meet a back face first.
 float BackShare(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, int count,
@@ -70,20 +71,44 @@ bool PushOut(const World& world, TexelSampler& sampler, const SobolSet& set, Tex
   return false;
 }
 
+TexelValidity Saving(int rays, TexelValidity result) {
+  result.rays_saved = rays;
+  return result;
+}
+
+// A texel that nothing else divides is inside or outside as its centre is.
+TexelValidity ProbeWhole(const World& world, TexelSampler& sampler, const SobolSet& set, TexelValidity result) {
+  const TexelPoint center = sampler.At({0.5f, 0.5f});
+  result.backface_share = BackShare(world, center.surface, center.frame, set, kInsideRays, result.rays);
+  if (result.backface_share > 0.5f) {
+    result.pushed_out = PushOut(world, sampler, set, result);
+    result.valid = result.pushed_out;
+  }
+  return Saving((kPlaces - 1) * kPlaceRays, result);
+}
+
 }  // namespace
 
 bool MeetsBack(const World& world, const Hit& hit) {
   return hit && hit.back && !world.MaterialOf(world.triangles()[hit.triangle]).double_sided;
 }
 
-TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<float> known_share, TexelSampler& sampler) {
+TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<float> known_share, PartSearch search,
+                            TexelSampler& sampler) {
   TexelValidity result;
   if (world.backfaces() == BackfaceMode::kPass) return result;
   const SobolSet set(HashCombine(key, 0x7a11du));
   const TexelPoint center = sampler.At({0.5f, 0.5f});
   result.backface_share =
-      known_share ? *known_share : BackShare(world, center.surface, center.frame, set, kFirstRays, result.rays);
-  if (result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) return result;
+      known_share ? *known_share : BackShare(world, center.surface, center.frame, set, kValidityFirstRays, result.rays);
+  if (search == PartSearch::kNear) {
+    if (result.backface_share == 0) return Saving(4, result);
+    if (result.backface_share > kInsideShare && !Crowded(world, center, sampler.radius(), result.rays)) {
+      return ProbeWhole(world, sampler, set, result);
+    }
+  } else if (result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) {
+    return result;
+  }
   const uint16_t mask = ProbeMask(world, sampler, set, result);
   if (mask != 0) {
     sampler.set_valid_mask(mask);

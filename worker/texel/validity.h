@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "worker/texel/sampler.h"
 
 namespace bakewell {
+
+inline constexpr int kValidityFirstRays = 8;  // where nobody knows yet
 
 // What rays from a texel say about where it lies.
 struct TexelValidity {
@@ -12,6 +15,7 @@ struct TexelValidity {
   bool pushed_out = false;   // all of it was inside geometry, and rays now start past the back face beside it
   float backface_share = 0;  // of the probed hemisphere that meets a back face first
   int rays = 0;
+  int rays_saved = 0;  // by PartSearch::kNear
 };
 
 // Finds the parts of a texel that lie inside other geometry (more than half of their hemisphere meets the back of a
@@ -19,7 +23,11 @@ struct TexelValidity {
 // back face within its own diagonal, if that helps. Texels whose first rays meet no back face, and that have nothing
 // standing within their own reach, cost no more than those rays. `known_share`: share of back faces that rays of the
 // caller's met already; without it eight rays find out. With BackfaceMode::kPass nothing has a back.
-TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<float> known_share, TexelSampler& sampler);
+// Search::kNear trusts those rays where they start all over the texel: it looks for parts only where some met a back
+// face and something stands within the texel's reach; elsewhere what holds for the centre holds for all of it.
+enum class PartSearch : uint8_t { kAll, kNear };
+TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<float> known_share, PartSearch search,
+                            TexelSampler& sampler);
 
 // Whether a ray's first hit is the back of a single-sided surface.
 bool MeetsBack(const World& world, const Hit& hit);

@@ -73,6 +73,32 @@ Rgb SampleColor(const Texture& texture, const TextureRef& ref, Vec2f uv) {
   return sum;
 }
 
+std::pair<float, float> AlphaRange(const Texture& texture, const TextureRef& ref, const std::array<Vec2f, 3>& corners) {
+  constexpr float kMargin = 2;  // texels: the filter's reach and rounding
+  constexpr double kMostTexels = 65536;
+  constexpr float kFarthest = 1 << 20;  // texels; beyond, their numbers are not exact
+  const Vec2f size{static_cast<float>(texture.width), static_cast<float>(texture.height)};
+  if (texture.width <= 0 || texture.height <= 0) return {0, 0};
+  Vec2f low{kFarthest, kFarthest}, high = low * -1.0f;
+  for (const Vec2f corner : corners) {
+    const Vec2f p = Transform(ref, corner);
+    if (!std::isfinite(p.x) || !std::isfinite(p.y)) return {0, 1};
+    low = {std::min(low.x, p.x * size.x - kMargin), std::min(low.y, p.y * size.y - kMargin)};
+    high = {std::max(high.x, p.x * size.x + kMargin), std::max(high.y, p.y * size.y + kMargin)};
+  }
+  if (low.x < -kFarthest || low.y < -kFarthest || high.x > kFarthest || high.y > kFarthest) return {0, 1};
+  if (static_cast<double>(high.x - low.x) * static_cast<double>(high.y - low.y) > kMostTexels) return {0, 1};
+  uint8_t least = 255, most = 0;
+  for (int y = static_cast<int>(std::floor(low.y)); y <= static_cast<int>(high.y); ++y) {
+    for (int x = static_cast<int>(std::floor(low.x)); x <= static_cast<int>(high.x); ++x) {
+      const uint8_t alpha = TexelAt(texture, x, y)[3];
+      least = std::min(least, alpha);
+      most = std::max(most, alpha);
+    }
+  }
+  return {static_cast<float>(least) / 255.0f, static_cast<float>(most) / 255.0f};
+}
+
 float SampleAlpha(const Texture& texture, const TextureRef& ref, Vec2f uv) {
   float sum = 0;
   Filter(texture, ref, uv,

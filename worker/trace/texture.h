@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <utility>
+
 #include "core/scene/scene.h"
 
 namespace bakewell {
@@ -10,5 +13,9 @@ Rgb SampleColor(const Texture& texture, const TextureRef& ref, Vec2f uv);
 
 // Alpha in [0,1], likewise.
 float SampleAlpha(const Texture& texture, const TextureRef& ref, Vec2f uv);
+
+// Bounds of SampleAlpha over the triangle with these texture coordinates, from the texels of its bounding box: {least,
+// most}. {0, 1} where that holds more than 65,536 of them.
+std::pair<float, float> AlphaRange(const Texture& texture, const TextureRef& ref, const std::array<Vec2f, 3>& corners);
 
 }  // namespace bakewell

@@ -31,9 +31,11 @@ World::World(const Scene& scene, BackfaceMode backfaces, float albedo_limit)
 
 World::~World() = default;
 
-absl::StatusOr<std::unique_ptr<World>> World::Build(const Scene& scene, BackfaceMode backfaces, float albedo_limit) {
+absl::StatusOr<std::unique_ptr<World>> World::Build(const Scene& scene, BackfaceMode backfaces, float albedo_limit,
+                                                    const SkipSet& no_skip) {
   std::unique_ptr<World> world(new World(scene, backfaces, albedo_limit));
   BAKEWELL_RETURN_IF_ERROR(world->BuildTriangles());
+  world->SortByAlpha(!no_skip.Has(Skip::kOpaqueAlpha));
   BAKEWELL_RETURN_IF_ERROR(world->BuildDevice());
   return world;
 }
@@ -58,6 +60,8 @@ bool MakeTriangle(const Object& object, uint32_t k, Triangle& triangle) {
 bool IsOpaque(const Material& material, BackfaceMode backfaces) {
   return material.alpha_mode == AlphaMode::kOpaque && (backfaces != BackfaceMode::kPass || material.double_sided);
 }
+
+constexpr float kAlphaRounding = 1e-5f;
 
 // True where rounding tilts the plane that Embree intersects by more than SurfacePoint::offset allows for: the cross
 // product of two edges is off by about 2^-23 |e1| |e2|.
@@ -99,16 +103,48 @@ absl::Status World::BuildTriangles() {
   return absl::OkStatus();
 }
 
-void World::AddGeometry(uint32_t begin, uint32_t end, bool filtered) {
-  if (begin == end) return;
-  const size_t count = end - begin;
+// A triangle whose alpha lets every ray pass, or none, need not be asked.
+void World::SortByAlpha(bool look) {
+  for (uint32_t k = 0; k < triangles_.size(); ++k) {
+    const Triangle& t = triangles_[k];
+    const Material& material = MaterialOf(t);
+    const bool has_alpha = material.alpha_mode != AlphaMode::kOpaque;
+    opaque_alpha_.of += has_alpha ? 1 : 0;
+    if (k < opaque_count_) {
+      of_geometry_[kStops].push_back(k);
+      continue;
+    }
+    const auto [least, most] = look && has_alpha ? AlphaRange(t) : std::pair(0.0f, 1.0f);
+    const bool mask = material.alpha_mode == AlphaMode::kMask;
+    const bool passes = mask ? most < material.alpha_cutoff - kAlphaRounding : most <= 0;
+    const bool stops = mask ? least >= material.alpha_cutoff + kAlphaRounding : least >= 1;
+    const bool whole = stops && (backfaces_ != BackfaceMode::kPass || material.double_sided) && !IsNeedle(t);
+    opaque_alpha_.skipped += passes || whole ? 1 : 0;
+    if (!passes) of_geometry_[whole ? kStops : kAsks].push_back(k);
+  }
+}
+
+std::pair<float, float> World::AlphaRange(const Triangle& t) const {
+  const Material& material = MaterialOf(t);
+  const TextureRef& ref = material.base_texture;
+  if (ref.texture < 0) return {material.base_alpha, material.base_alpha};
+  const std::array<Vec2f, 3> corners = {TexcoordAt(t, ref.texcoord, 0, 0), TexcoordAt(t, ref.texcoord, 1, 0),
+                                        TexcoordAt(t, ref.texcoord, 0, 1)};
+  const auto [least, most] = bakewell::AlphaRange(scene_.textures[ref.texture], ref, corners);
+  return {material.base_alpha * least, material.base_alpha * most};
+}
+
+void World::AddGeometry(Geometry geometry_id) {
+  const std::vector<uint32_t>& listed = of_geometry_[geometry_id];
+  if (listed.empty()) return;
+  const size_t count = listed.size();
   RTCGeometry geometry = rtcNewGeometry(device_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * count));
   auto* indices = static_cast<uint32_t*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), count));
   for (size_t k = 0; k < count; ++k) {
-    const Triangle& t = triangles_[begin + k];
+    const Triangle& t = triangles_[listed[k]];
     const Object& object = scene_.objects[t.object];
     for (size_t corner = 0; corner < 3; ++corner) {
       const Vec3f p = object.position[object.index[3 * t.index_in_object + corner]];
@@ -116,12 +152,12 @@ void World::AddGeometry(uint32_t begin, uint32_t end, bool filtered) {
       indices[3 * k + corner] = static_cast<uint32_t>(3 * k + corner);
     }
   }
-  if (filtered) {
+  if (geometry_id == kAsks) {
     rtcSetGeometryIntersectFilterFunction(geometry, &World::Filter);
     rtcSetGeometryOccludedFilterFunction(geometry, &World::Filter);
   }
   rtcCommitGeometry(geometry);
-  rtcAttachGeometryByID(device_->scene, geometry, filtered ? 1 : 0);
+  rtcAttachGeometryByID(device_->scene, geometry, geometry_id);
   rtcReleaseGeometry(geometry);
 }
 
@@ -131,8 +167,8 @@ absl::Status World::BuildDevice() {
   device_->scene = rtcNewScene(device_->device);
   rtcSetSceneFlags(device_->scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(device_->scene, RTC_BUILD_QUALITY_MEDIUM);
-  AddGeometry(0, opaque_count_, false);
-  AddGeometry(opaque_count_, static_cast<uint32_t>(triangles_.size()), true);
+  AddGeometry(kStops);
+  AddGeometry(kAsks);
   rtcCommitScene(device_->scene);
   if (rtcGetDeviceError(device_->device) != RTC_ERROR_NONE) {
     return absl::ResourceExhaustedError("Embree could not build its tree: not enough memory for this scene");
@@ -145,7 +181,7 @@ void World::Filter(const RTCFilterFunctionNArguments* arguments) {
   if (*arguments->valid == 0) return;
   const auto* context = reinterpret_cast<const TraceContext*>(arguments->context);
   const auto* hit = reinterpret_cast<const RTCHit*>(arguments->hit);
-  const uint32_t triangle = context->world->opaque_count_ + hit->primID;
+  const uint32_t triangle = context->world->TriangleOf(kAsks, hit->primID);
   const Ray& asked = *context->ray;
   if (triangle == asked.from || triangle == asked.to ||
       context->world->Passes(triangle, hit->u, hit->v, asked.dir, asked.key)) {
@@ -179,7 +215,7 @@ Hit World::Intersect(const Ray& ray) const {
   rtcIntersect1(device_->scene, &context.rtc, &query);
   Hit hit;
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
-  hit.triangle = query.hit.primID + (query.hit.geomID == 1 ? opaque_count_ : 0);
+  hit.triangle = TriangleOf(query.hit.geomID, query.hit.primID);
   hit.t = query.ray.tfar;
   hit.u = query.hit.u;
   hit.v = query.hit.v;

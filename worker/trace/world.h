@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -52,7 +53,8 @@ struct SurfacePoint {
 // non-finite triangles are left out. Same scene, same hits: one build thread, ISA pinned to AVX2, robust intersection.
 class World {
  public:
-  static absl::StatusOr<std::unique_ptr<World>> Build(const Scene& scene, BackfaceMode backfaces, float albedo_limit);
+  static absl::StatusOr<std::unique_ptr<World>> Build(const Scene& scene, BackfaceMode backfaces, float albedo_limit,
+                                                      const SkipSet& no_skip = {});
   ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
@@ -66,6 +68,9 @@ class World {
   // Sphere around all vertices, centred at their mean [m].
   Vec3f center() const { return center_; }
   float radius() const { return radius_; }
+
+  // Triangles whose alpha is the same to every ray, so that none looks it up, of those of materials with alpha.
+  const SkipCount& opaque_alpha() const { return opaque_alpha_; }
 
   const Material& MaterialOf(const Triangle& triangle) const { return scene_.materials[triangle.material]; }
   // The point at a hit, on the side the ray came from.
@@ -84,8 +89,14 @@ class World {
   struct TraceContext;
   World(const Scene& scene, BackfaceMode backfaces, float albedo_limit);
   absl::Status BuildTriangles();
+  void SortByAlpha(bool look);
   absl::Status BuildDevice();
-  void AddGeometry(uint32_t begin, uint32_t end, bool filtered);
+  enum Geometry : uint8_t { kStops, kAsks };
+  void AddGeometry(Geometry geometry);
+  std::pair<float, float> AlphaRange(const Triangle& triangle) const;  // least and most
+  uint32_t TriangleOf(uint32_t geometry, uint32_t primitive) const {
+    return geometry == kStops && primitive < opaque_count_ ? primitive : of_geometry_[geometry][primitive];
+  }
   static void Filter(const RTCFilterFunctionNArguments* arguments);
   bool Passes(uint32_t triangle, float u, float v, Vec3f dir, uint32_t key) const;
   Vec2f TexcoordAt(const Triangle& triangle, int set, float u, float v) const;
@@ -93,8 +104,12 @@ class World {
   const Scene& scene_;
   BackfaceMode backfaces_;
   float albedo_limit_;
-  std::vector<Triangle> triangles_;  // those that stop every ray first, then those that Filter is asked about
+  std::vector<Triangle> triangles_;  // those of opaque materials first
   uint32_t opaque_count_ = 0;
+  // What Embree gets: triangles that stop every ray, those that Filter is asked about. What lets all rays pass is in
+  // neither.
+  std::array<std::vector<uint32_t>, 2> of_geometry_;
+  SkipCount opaque_alpha_;
   Vec3f center_;
   float radius_ = 0;
   std::unique_ptr<Device> device_;

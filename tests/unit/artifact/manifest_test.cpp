@@ -22,7 +22,7 @@ TEST(Manifest, SaysWhatItWasGiven) {
   manifest.scene_file = "office.glb";
   manifest.settings_json = R"({"quality":"HIGH"})";
   manifest.phases = {{"chart", 1, 2}, {"gather", 3, 5}};
-  manifest.counters = {{"gather/rays", 7}};
+  manifest.counters = {{"gather/rays", 7}, {"skip/no_light/enabled", 1}, {"skip/no_light/of", 3}};
   manifest.warnings = {"no normals"};
   manifest.files = {DescribeFile(folder / "abc", "irradiance").value()};
   ASSERT_TRUE(WriteManifest(folder.Path(), manifest).ok());
@@ -34,6 +34,9 @@ TEST(Manifest, SaysWhatItWasGiven) {
   EXPECT_EQ(json["statistics"]["cpu_seconds"], 7);
   EXPECT_EQ(json["statistics"]["phases"][1]["phase"], "gather");
   EXPECT_EQ(json["statistics"]["counters"]["gather/rays"], 7);
+  EXPECT_EQ(json["statistics"]["counters"].size(), 1u);
+  EXPECT_EQ(json["statistics"]["skip"]["no_light"]["enabled"], true);
+  EXPECT_EQ(json["statistics"]["skip"]["no_light"]["of"], 3);
   EXPECT_EQ(json["warnings"][0], "no normals");
   EXPECT_EQ(json["files"][0]["name"], "abc");
   EXPECT_EQ(json["files"][0]["size_bytes"], 3);

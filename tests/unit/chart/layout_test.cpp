@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "server/chart/choose.h"
 #include "server/chart/generate.h"
 #include "server/chart/keep.h"
 #include "server/chart/picture.h"
@@ -50,6 +51,16 @@ TEST(KeepCharts, MissingAndBadUvsNameTheObject) {
     scene.objects[0].uv1[3].x = bad;
     EXPECT_EQ(KeepCharts(scene, {64, 64}).status().code(), absl::StatusCode::kInvalidArgument) << bad;
   }
+}
+
+// `bake --uv keep` of a level without TEXCOORD_1 and without a page size crashed: its density was measured first.
+TEST(ChooseCharts, KeepingChartsThatAreNotThereIsRefused) {
+  Scene scene;
+  scene.objects = {ObjectOf({{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}, {0, 1, 2}}, "bare")};
+  BakeSettings settings;
+  settings.uv = UvMode::kKeep;
+  const auto layout = ChooseCharts(scene, settings);
+  EXPECT_EQ(layout.status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 TEST(KeepCharts, ObjectsThatOnlyBlockNeedNoUvs) {

@@ -26,6 +26,7 @@ BakeSettings Unusual() {
   settings.albedo_limit = 0.9f;
   settings.footprint = 0.75f;
   settings.seed = 0xffffffff;
+  settings.no_skip.Add(Skip::kDarkCharts);
   Environment& environment = settings.environment.emplace();
   environment.type = EnvironmentType::kGradient;
   environment.zenith = {1, 2, 3};
@@ -43,6 +44,7 @@ TEST(Settings, JsonBringsEveryFieldBack) {
   EXPECT_EQ(read->footprint, 0.75f);
   EXPECT_EQ(read->density, DensityMode::kSignal);
   EXPECT_EQ(read->photons, int64_t{5} << 32);
+  EXPECT_EQ(read->no_skip, Unusual().no_skip);
   EXPECT_EQ(read->environment->horizon.y, 0.2f);
   EXPECT_EQ(SettingsJson(*read), json);  // and so all others
 }

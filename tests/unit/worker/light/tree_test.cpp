@@ -45,6 +45,57 @@ Scene Lights(int count, uint32_t seed) {
 
 LightTree::Place RandomPlace(TestRandom& random) { return {random.InCube(6), random.Direction()}; }
 
+// Mean unoccluded irradiance (luminance) of a light, over 64 of its points.
+double IrradianceOf(const LightSet& lights, int light, Vec3f position, Vec3f normal, TestRandom& random) {
+  double sum = 0;
+  for (int i = 0; i < 64; ++i) {
+    const LightSample sample = lights.SampleLocal(light, position, random.Square());
+    sum += static_cast<double>(Luminance(sample.perpendicular) * std::max(0.0f, Dot(sample.dir, normal)));
+  }
+  return sum / 64;
+}
+
+TEST(LightTree, WhatIsCulledBringsNoPointMoreThanIsDispensable) {
+  TestRandom random(12);
+  size_t culled_lights = 0;
+  double largest = 0;
+  for (uint32_t scene = 0; scene < 6; ++scene) {
+    const Lit lit(Lights(200, 40 + scene));
+    const LightTree tree(*lit.lights);
+    for (int k = 0; k < 30; ++k) {
+      const LightTree::Place place{random.InCube(12), {}, random.Between(0.01f, 2)};
+      const float dispensable = std::exp2(random.Between(-8, 2));
+      const std::vector<int> cut = tree.Cut(place, 64), kept = tree.Cull(cut, place, dispensable);
+      std::set<int> culled;
+      for (const int node : cut) culled.insert(tree.LightsOf(node).begin(), tree.LightsOf(node).end());
+      EXPECT_EQ(std::ssize(culled), lit.lights->local_count());
+      for (const int node : kept) {
+        for (const int light : tree.LightsOf(node)) culled.erase(light);
+      }
+      culled_lights += culled.size();
+      for (int p = 0; p < 4; ++p) {
+        const Vec3f position = place.position + random.Direction() * (place.radius * random.Unit());
+        const Vec3f normal = random.Direction();
+        double sum = 0;
+        for (const int light : culled) sum += IrradianceOf(*lit.lights, light, position, normal, random);
+        // 64 points of a light tell its irradiance within a few percent; all together they stay below the bound.
+        EXPECT_LE(sum, 1.02 * static_cast<double>(dispensable)) << "scene " << scene << " place " << k;
+        largest = std::max(largest, sum / static_cast<double>(dispensable));
+      }
+    }
+  }
+  EXPECT_GT(culled_lights, 1000u);
+  EXPECT_GT(largest, 0.1) << "a bound that loose culls too little";
+}
+
+TEST(LightTree, NothingIsCulledWhereNothingIsDispensable) {
+  const Lit lit(Lights(100, 3));
+  const LightTree tree(*lit.lights);
+  const LightTree::Place place{{1, 2, 3}, {}, 1};
+  const std::vector<int> cut = tree.Cut(place, 64);
+  EXPECT_EQ(tree.Cull(cut, place, -1), cut);
+}
+
 TEST(LightTree, NoLightThatBringsLightIsLeftOut) {
   const Lit lit(Lights(500, 1));
   const LightTree tree(*lit.lights);

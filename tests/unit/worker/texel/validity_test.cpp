@@ -30,7 +30,7 @@ Probed Probe(const Scene& scene, int x, int y, BackfaceMode mode = BackfaceMode:
   const PreparedLevel prepared = PrepareInMemory(scene, settings);
   const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * y + x)]];
   TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-  const TexelValidity validity = ProbeValidity(*prepared.world, 1, std::nullopt, sampler);
+  const TexelValidity validity = ProbeValidity(*prepared.world, 1, std::nullopt, PartSearch::kAll, sampler);
   return {validity, sampler.valid_mask()};
 }
 
@@ -66,6 +66,22 @@ TEST(ProbeValidity, HalfCoveredTexelIsMasked) {
   EXPECT_FALSE(probed.validity.pushed_out);
   EXPECT_EQ(probed.mask, 0x3333);
   EXPECT_NEAR(probed.validity.backface_share, 0.5, 1e-6);
+}
+
+TEST(ProbeValidity, NearSearchFindsTheSameWithFewerRays) {
+  BakeSettings settings;
+  settings.footprint = 1;
+  for (const auto& [x0, x, share] : {std::tuple(1.0, 3, 1.0f), {1.0, 1, 1.0f}, {1.0, 0, 0.0f}, {1.5, 1, 0.5f}}) {
+    const PreparedLevel prepared = PrepareInMemory(FloorWithBox(x0, 6, 1, 6), settings);
+    const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(24 + x)]];
+    TexelSampler all(*prepared.world, prepared.layout, prepared.texels, texel), near = all;
+    const TexelValidity a = ProbeValidity(*prepared.world, 1, share, PartSearch::kAll, all);
+    const TexelValidity b = ProbeValidity(*prepared.world, 1, share, PartSearch::kNear, near);
+    EXPECT_EQ(a.valid, b.valid) << x;
+    EXPECT_EQ(a.pushed_out, b.pushed_out) << x;
+    EXPECT_EQ(all.valid_mask(), near.valid_mask()) << x;
+    EXPECT_EQ(b.rays_saved > 0, b.rays < a.rays) << x;
+  }
 }
 
 TEST(ProbeValidity, NothingHasABackWhereBackfacesPass) {

@@ -6,6 +6,7 @@
 
 #include "tests/support/scene_builder.h"
 #include "tests/support/statistics.h"
+#include "worker/trace/texture.h"
 
 namespace bakewell {
 namespace {
@@ -44,6 +45,33 @@ TEST(World, HitTellsTriangleDistanceBarycentricsAndSide) {
     EXPECT_EQ(world->PointAt(back).normal, (Vec3f{0, 0, -1}));
   }
   EXPECT_FALSE(world->Intersect(Down(0.6f, 0)));
+}
+
+TEST(AlphaRange, HoldsEverySampleOfTheTriangle) {
+  TestRandom random(9);
+  int narrow = 0;
+  for (int i = 0; i < 300; ++i) {
+    Texture texture{16, 8, WrapMode::kRepeat, WrapMode::kMirroredRepeat, i % 2 == 0, {}};
+    if (i % 3 == 0) texture.wrap_u = WrapMode::kClampToEdge;
+    for (int k = 0; k < 16 * 8 * 4; ++k) texture.rgba.push_back(static_cast<uint8_t>(256 * random.Unit()));
+    const float size = std::exp2(random.Between(-7, 1));
+    TextureRef ref;
+    ref.offset = {random.Between(-2, 2), random.Between(-2, 2)};
+    ref.rotation_rad = random.Between(0, 6);
+    std::array<Vec2f, 3> corners;
+    for (Vec2f& corner : corners) corner = {random.Between(-3, 3) * size, random.Between(-3, 3) * size};
+    const auto [least, most] = AlphaRange(texture, ref, corners);
+    narrow += least > 0.02f || most < 0.98f ? 1 : 0;
+    for (int k = 0; k < 100; ++k) {
+      Vec2f b = random.Square();
+      if (b.x + b.y > 1) b = {1 - b.x, 1 - b.y};
+      const Vec2f uv = corners[0] * (1 - b.x - b.y) + corners[1] * b.x + corners[2] * b.y;
+      const float alpha = SampleAlpha(texture, ref, uv);
+      EXPECT_GE(alpha, least - 1e-5f);
+      EXPECT_LE(alpha, most + 1e-5f);
+    }
+  }
+  EXPECT_GT(narrow, 30) << "ranges that say something";
 }
 
 TEST(World, MaskLetsThroughWhereTheTextureIsBelowTheCutoff) {
