@@ -18,7 +18,7 @@ constexpr int kPhotonsPerTexel = 24, kSamples = 64, kRecordedTiles = 12;
 }  // namespace
 
 std::vector<int> KernelLevel::Tiles(int count) const {
-  const int all = level->texels.tile_count(), step = std::max(1, all / count);
+  const int all = texels->tile_count(), step = std::max(1, all / count);
   std::vector<int> tiles;
   for (int tile = step / 2; tile < all; tile += step) tiles.push_back(tile);
   return tiles;
@@ -33,7 +33,8 @@ absl::StatusOr<std::unique_ptr<KernelLevel>> LoadKernelLevel(const std::string& 
   BAKEWELL_ASSIGN_OR_RETURN(AtlasLayout layout, ChooseCharts(loaded.scene, settings));
   BAKEWELL_ASSIGN_OR_RETURN(made->level, BuildLevel(std::move(loaded.scene), std::move(layout), settings));
   const Level& level = *made->level;
-  settings.photons = kPhotonsPerTexel * std::ssize(level.texels.texels);
+  made->texels = level.texels->Page(0);
+  settings.photons = kPhotonsPerTexel * level.texels->texel_count();
   made->stage = BuildPhotonStage(level, settings);
   made->photons.flux.resize(2 * made->stage->cells.cells().size());
   NoProgress progress;
@@ -42,12 +43,12 @@ absl::StatusOr<std::unique_ptr<KernelLevel>> LoadKernelLevel(const std::string& 
   made->cache = EstimateDensity(*level.world, made->stage->cells, made->photons, made->stage->plan, {}, progress);
   made->tree = std::make_unique<LightTree>(*level.lights);
   made->options.min_samples = made->options.max_samples = kSamples;
-  made->options.mean_irradiance = MeanIrradiance(level.texels, made->stage->cells, made->cache);
+  made->options.mean_irradiance = MeanIrradiance(*made->texels, made->stage->cells, made->cache);
   made->bare = std::make_unique<BareScene>(*level.world);
   const RecordRays record(made->rays);
   for (const int tile : made->Tiles(kRecordedTiles)) {
     GatherCounters counters;
-    GatherTile(made->scene(), level.layout, level.texels, tile, made->options, counters);
+    GatherTile(made->scene(), level.layout, *made->texels, tile, made->options, counters);
   }
   return made;
 }

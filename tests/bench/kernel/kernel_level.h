@@ -12,6 +12,7 @@ namespace bakewell {
 struct KernelLevel {
   std::string name;
   std::shared_ptr<const Level> level;
+  std::shared_ptr<const TexelMap> texels;  // of the first page
   std::shared_ptr<const PhotonStage> stage;
   PhotonMap photons;
   RadianceCache cache;

@@ -81,8 +81,9 @@ void RegisterPhotons(const KernelLevel& k) {
 
 void RegisterTexels(const KernelLevel& k) {
   const Level& level = *k.level;
-  Register(k, "rasterise",
-           [&level] { return std::ssize(RasterizeTexels(*level.world, level.layout, level.texels.footprint).texels); });
+  Register(k, "rasterise", [&k, &level] {
+    return std::ssize(RasterizeTexels(*level.world, level.layout, k.texels->footprint).texels);
+  });
   for (const int samples : {8, 64}) {
     Register(k, "gather/" + std::to_string(samples), [&k, &level, samples] {
       GatherOptions options = k.options;
@@ -90,27 +91,27 @@ void RegisterTexels(const KernelLevel& k) {
       GatherCounters counters;
       int64_t texels = 0;
       for (const int tile : k.Tiles(8))
-        texels += std::ssize(GatherTile(k.scene(), level.layout, level.texels, tile, options, counters));
+        texels += std::ssize(GatherTile(k.scene(), level.layout, *k.texels, tile, options, counters));
       return texels;
     });
   }
   auto lights = std::make_shared<std::vector<TexelLight>>();
   GatherOptions options = k.options;
   options.min_samples = options.max_samples = 8;
-  for (int tile = 0; tile < level.texels.tile_count(); ++tile) {
+  for (int tile = 0; tile < k.texels->tile_count(); ++tile) {
     GatherCounters counters;
-    const auto some = GatherTile(k.scene(), level.layout, level.texels, tile, options, counters);
+    const auto some = GatherTile(k.scene(), level.layout, *k.texels, tile, options, counters);
     lights->insert(lights->end(), some.begin(), some.end());
   }
-  Register(k, "filter", [&level, lights] {
+  Register(k, "filter", [&k, lights] {
     std::vector<TexelLight> copy = *lights;
     FilterCounters counters;
     tbb::task_arena one(1);
-    one.execute([&] { FilterPage(level.texels, 0, copy, counters); });
+    one.execute([&] { FilterPage(*k.texels, 0, copy, counters); });
     return std::ssize(copy);
   });
-  Register(k, "finish", [&level, lights] {
-    benchmark::DoNotOptimize(FinishPage(level.texels, *lights, 0));
+  Register(k, "finish", [&k, lights] {
+    benchmark::DoNotOptimize(FinishPage(*k.texels, *lights, 0));
     return std::ssize(*lights);
   });
 }
@@ -131,8 +132,8 @@ void RegisterSamples(const KernelLevel& k) {
   if (k.tree->empty()) return;
   Register(k, "light_tree", [&k] {
     int64_t drawn = 0;
-    for (size_t i = 0; i < k.level->texels.texels.size(); i += 7, ++drawn) {
-      const Texel& texel = k.level->texels.texels[i];
+    for (size_t i = 0; i < k.texels->texels.size(); i += 7, ++drawn) {
+      const Texel& texel = k.texels->texels[i];
       const float u = UnitFloat(HashWide(i));
       benchmark::DoNotOptimize(k.tree->Draw(LightTree::kRoot, {texel.position, texel.normal}, u));
     }
