@@ -27,16 +27,14 @@ def bake(level, samples, photons_per_texel, texels_hint, options=()):
     with tempfile.TemporaryDirectory() as folder:
         words = [os.environ.get("BAKEWELL_PROGRAM", converge.PROGRAM), "bake", level, "-o", folder, "--target-error", "1e-9", "--samples", str(samples),
                  "--photons", str(max(1024, int(photons_per_texel * texels_hint))), *options]
-        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        error = process.stderr.read()
-        _, status, usage = os.wait4(process.pid, 0)
-        if status != 0:
-            sys.exit(" ".join(words) + "\n" + error)
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            sys.exit(" ".join(words) + "\n" + done.stderr)
         with open(os.path.join(folder, "manifest.json"), encoding="utf-8") as file:
             statistics = json.load(file)["statistics"]
     counters = statistics["counters"]
     return {"cpu_s": {p["phase"]: p["cpu_seconds"] for p in statistics["phases"]}, "texels": counters["texels/covered"], "rays": statistics["rays"],
-            "traversed": counters["gather/rays"] + counters["gather/shadow_rays"] + counters["gather/bounce_rays"], "peak_mb": usage.ru_maxrss / 1024}
+            "traversed": counters["gather/rays"] + counters["gather/shadow_rays"] + counters["gather/bounce_rays"], "peak_mb": statistics["peak_memory_bytes"] / 2**20}
 
 
 def rows_of(axis, samples):

@@ -23,6 +23,7 @@ TEST(Manifest, SaysWhatItWasGiven) {
   manifest.settings_json = R"({"quality":"HIGH"})";
   manifest.phases = {{"chart", 1, 2}, {"gather", 3, 5}};
   manifest.counters = {{"gather/rays", 7}};
+  manifest.peak_memory_bytes = 4096;
   manifest.warnings = {"no normals"};
   manifest.files = {DescribeFile(folder / "abc", "irradiance").value()};
   ASSERT_TRUE(WriteManifest(folder.Path(), manifest).ok());
@@ -34,6 +35,7 @@ TEST(Manifest, SaysWhatItWasGiven) {
   EXPECT_EQ(json["statistics"]["cpu_seconds"], 7);
   EXPECT_EQ(json["statistics"]["phases"][1]["phase"], "gather");
   EXPECT_EQ(json["statistics"]["counters"]["gather/rays"], 7);
+  EXPECT_EQ(json["statistics"]["peak_memory_bytes"], 4096);
   EXPECT_EQ(json["warnings"][0], "no normals");
   EXPECT_EQ(json["files"][0]["name"], "abc");
   EXPECT_EQ(json["files"][0]["size_bytes"], 3);
@@ -47,6 +49,7 @@ TEST(Manifest, EmptyListsAreListsAndNanIsNull) {
   EXPECT_EQ(json["files"], Json::array());
   EXPECT_EQ(json["statistics"]["counters"], Json::object());
   EXPECT_TRUE(json["statistics"]["estimated_error"].is_null());
+  EXPECT_TRUE(json["statistics"]["peak_memory_bytes"].is_null());
 }
 
 TEST(Manifest, SettingsThatAreNoObjectAreRefused) {
