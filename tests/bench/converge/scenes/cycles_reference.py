@@ -2,7 +2,8 @@
 Two independent halves of a reference by ../shared/reference/cycles_bake.py: every light is baked alone and added up, with as many
 samples as a pilot says it is worth (n ~ sqrt(variance / cost)). Run by make_references.py.
 
-job: {"glb", "threads", "camera": null, "groups": [{"spp": 1, "seed": 90, "out": scratch}], "seconds": CPU seconds a half, "halves": [path, path]}"""
+job: {"glb", "threads", "camera": null, "groups": [{"spp": 1, "seed": 90, "out": scratch}], "seconds": CPU seconds a half,
+"halves": [path, path], "first_seed": 100000}"""
 import os
 
 here = os.path.dirname(os.path.abspath(__file__))
@@ -35,7 +36,7 @@ print("SAMPLES", count.tolist(), "CPU s expected", float((count * cost).sum() + 
 for half, out in enumerate(job["halves"]):
     total, seconds = 0, 0
     for i, group in enumerate(base["G"]):
-        image, cpu = bake_group(group, int(count[i]), 100000 * (half + 1) + i)
+        image, cpu = bake_group(group, int(count[i]), job["first_seed"] + 100000 * half + i)
         total, seconds = total + image, seconds + cpu
     base["save"](out, total, half=True)
     print("HALF", out, seconds, flush=True)

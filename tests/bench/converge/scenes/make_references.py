@@ -1,10 +1,11 @@
 #!/usr/bin/python3
 """The references of this folder's scenes: two halves by Cycles (package blender) and the mask of the texels that are compared.
 
-make_references.py [--seconds 450] [--mask-only] sunlit level
+make_references.py [--seconds 450] [--mask-only | --add] sunlit level
 
 Writes <scene>_A.exr, <scene>_B.exr (half-float RGB, irradiance [W/m^2]) and <scene>_mask.png: 0 uncovered, 128 covered, 192 interior (the 3 x 3
-texels around it are covered), 255 interior and clean (less than 2 % of the hemisphere sees a back face first)."""
+texels around it are covered), 255 interior and clean (less than 2 % of the hemisphere sees a back face first). With --add the new halves are averaged with those
+that are there, weighted by the CPU seconds of each (kept in <scene>_runs.json); every run has seeds of its own."""
 import argparse
 import json
 import os
@@ -72,22 +73,40 @@ def make_mask(name, folder):
     print(f"{name}: {covered.sum()} covered, {interior.sum()} interior, {(values == 255).sum()} clean", flush=True)
 
 
+def make_halves(name, folder, seconds, add):
+    at = lambda suffix: os.path.join(folder, name + suffix)
+    runs = json.load(open(at("_runs.json"), encoding="utf-8")) if add else []
+    with tempfile.TemporaryDirectory() as scratch:
+        new = [os.path.join(scratch, half + ".exr") for half in "AB"]
+        blender(os.path.join(HERE, "cycles_reference.py"), {
+            "glb": at(".glb"), "seconds": seconds, "halves": new, "first_seed": 100000 * (2 * len(runs) + 1),
+            "groups": [{"spp": 1, "seed": 90, "out": os.path.join(scratch, "pilot.exr")}]})
+        before = sum(run["seconds"] for run in runs)
+        for path, kept in zip(new, (at("_A.exr"), at("_B.exr"))):
+            image = oiio.ImageBuf(path).get_pixels(oiio.FLOAT)
+            if add:
+                image = (before * oiio.ImageBuf(kept).get_pixels(oiio.FLOAT) + seconds * image) / (before + seconds)
+            out = oiio.ImageBuf(np.ascontiguousarray(image))
+            out.set_write_format("half")
+            out.specmod().attribute("compression", "zip")
+            out.write(kept)
+    with open(at("_runs.json"), "w", encoding="utf-8") as file:
+        json.dump(runs + [{"seconds": seconds}], file)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+")
     parser.add_argument("--folder", default=HERE)
     parser.add_argument("--seconds", type=float, default=450)
     parser.add_argument("--mask-only", action="store_true")
+    parser.add_argument("--add", action="store_true")
     arguments = parser.parse_args()
     for name in arguments.scenes:
-        make_mask(name, arguments.folder)
-        if arguments.mask_only:
-            continue
-        at = lambda suffix: os.path.join(arguments.folder, name + suffix)
-        with tempfile.TemporaryDirectory() as scratch:
-            blender(os.path.join(HERE, "cycles_reference.py"), {
-                "glb": at(".glb"), "seconds": arguments.seconds, "halves": [at("_A.exr"), at("_B.exr")],
-                "groups": [{"spp": 1, "seed": 90, "out": os.path.join(scratch, "pilot.exr")}]})
+        if not arguments.add:
+            make_mask(name, arguments.folder)
+        if not arguments.mask_only:
+            make_halves(name, arguments.folder, arguments.seconds, arguments.add)
 
 
 if __name__ == "__main__":
