@@ -124,6 +124,7 @@ absl::StatusOr<BakeSummary> Bake(const BakeRequest& request, Progress& progress)
   phases.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
   manifest.phases = clock.phases();
+  manifest.peak_memory_bytes = PhaseClock::PeakMemoryBytes();
   BAKEWELL_ASSIGN_OR_RETURN(BakeSummary summary, Conclude(out, request.output_dir, manifest));
   summary.wall_seconds = PhaseClock::WallSeconds() - wall;
   summary.cpu_seconds = PhaseClock::CpuSeconds() - cpu;

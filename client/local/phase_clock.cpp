@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <fstream>
 
 namespace bakewell {
 
@@ -10,6 +11,16 @@ double PhaseClock::CpuSeconds() { return static_cast<double>(std::clock()) / CLO
 
 double PhaseClock::WallSeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// Not getrusage: its peak survives exec, and would be the caller's where that is larger.
+int64_t PhaseClock::PeakMemoryBytes() {
+  constexpr std::string_view kPeak = "VmHWM:";
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with(kPeak)) return std::stoll(line.substr(kPeak.size())) * 1024;
+  }
+  return 0;
 }
 
 void PhaseClock::Begin(std::string phase) {

@@ -17,6 +17,8 @@ class PhaseClock {
   const std::vector<PhaseTime>& phases() const { return phases_; }
   static double CpuSeconds();
   static double WallSeconds();
+  // Most memory that this process had resident at a time; 0 where the system does not say.
+  static int64_t PeakMemoryBytes();
 
  private:
   std::vector<PhaseTime> phases_;

@@ -116,6 +116,7 @@ absl::StatusOr<BakeSummary> BakeReference(const ReferenceRequest& request, Progr
     BAKEWELL_RETURN_IF_ERROR(writer.Preview(name + ".png", images.mean));
   }
   manifest.phases = clock.phases();
+  manifest.peak_memory_bytes = PhaseClock::PeakMemoryBytes();
   BAKEWELL_ASSIGN_OR_RETURN(BakeSummary summary, Conclude(out, request.output_dir, manifest));
   summary.wall_seconds = PhaseClock::WallSeconds() - wall;
   summary.cpu_seconds = PhaseClock::CpuSeconds() - cpu;

@@ -65,7 +65,7 @@ absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSe
 absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const BakeSettings& settings, PhaseClock& clock,
                                        Progress& progress) {
   BakedTexels baked;
-  Budget budget = BudgetOf(settings, prepared.texels);
+  Budget budget = BudgetOf(settings, std::ssize(prepared.texels.texels));
   BAKEWELL_ASSIGN_OR_RETURN(const Photons photons,
                             TracePhotons(prepared, settings, budget.photons, baked, clock, progress));
   clock.Begin("gather");

@@ -63,6 +63,7 @@ Json StatisticsJson(const Manifest& manifest) {
           {"rays", manifest.rays},
           {"photons", manifest.photons},
           {"estimated_error", manifest.estimated_error},
+          {"peak_memory_bytes", manifest.peak_memory_bytes > 0 ? Json(manifest.peak_memory_bytes) : Json()},
           {"phases", PhasesJson(manifest.phases)},
           {"counters", CountersJson(manifest.counters)},
           {"skip", SkipJson(manifest.counters)}};

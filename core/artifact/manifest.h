@@ -39,7 +39,8 @@ struct Manifest {
   std::map<std::string, int64_t> counters;   // slash names: gather/rays, skip/dark_chart
   int64_t rays = 0;
   int64_t photons = 0;
-  double estimated_error = 0;  // relative standard error of the irradiance, root mean square over valid texels
+  int64_t peak_memory_bytes = 0;  // resident, of the process that baked and wrote this; 0: others baked
+  double estimated_error = 0;     // relative standard error of the irradiance, root mean square over valid texels
   std::vector<std::string> warnings;
   std::vector<ManifestFile> files;
 };

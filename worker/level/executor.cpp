@@ -134,21 +134,14 @@ absl::StatusOr<std::shared_ptr<const PhotonStage>> LevelExecutor::PhotonStageOf(
 absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
   Say("texels", 0, 1);
   BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
-  const TexelMap& map = level->texels;
   level_task::Survey survey;
-  survey.texels = map.texels.size();
+  survey.texels = static_cast<uint64_t>(level->texels->texel_count());
   survey.photons = static_cast<uint64_t>(level->photons);
-  survey.overlapping_texels = static_cast<uint64_t>(map.overlapping_texels);
   survey.opaque_alpha = level->world->opaque_alpha();
-  survey.tile_end_of_page.assign(map.pages.size(), 0);
-  for (int tile = 0; tile < map.tile_count(); ++tile) {
-    const uint32_t begin = map.tile_begin[tile], end = map.tile_begin[tile + 1];
-    survey.texels_of_tile.push_back(end - begin);
-    if (end > begin) survey.tile_end_of_page[map.texels[begin].page] = static_cast<uint32_t>(tile + 1);
-  }
-  // A page without texels ends where the one before it ends.
-  for (size_t page = 1; page < survey.tile_end_of_page.size(); ++page) {
-    survey.tile_end_of_page[page] = std::max(survey.tile_end_of_page[page], survey.tile_end_of_page[page - 1]);
+  for (const TexelPages::PageCount& page : level->texels->pages()) {
+    survey.overlapping_texels += static_cast<uint64_t>(page.overlapping_texels);
+    survey.texels_of_tile.insert(survey.texels_of_tile.end(), page.texels_of_tile.begin(), page.texels_of_tile.end());
+    survey.tile_end_of_page.push_back(static_cast<uint32_t>(page.end_tile()));
   }
   Say("texels", 1, 1);
   return MadeOutputs{{"survey", level_task::Serialize(survey)}};
@@ -200,21 +193,25 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
     if (made->cache.irradiance.size() != 2 * stage->cells.cells().size()) {
       return absl::InvalidArgumentError("the radiance cache is of other cells");
     }
-    made->mean_irradiance = MeanIrradiance(level->texels, stage->cells, made->cache);
+    made->mean_irradiance = MeanIrradiance(*level->texels, stage->cells, made->cache);
     made->photon_flux = MeanPhotonFlux(stage->cells, made->cache);
     return made;
   }));
   const LightTree tree(*level->lights);
   const GatherScene scene{*level->world, *level->lights, tree, stage->cells, photons->cache};
-  GatherOptions options = BudgetOf(work.settings, level->texels).gather;
+  GatherOptions options = BudgetOf(work.settings, level->texels->texel_count()).gather;
   options.mean_irradiance = photons->mean_irradiance;
   options.photon_flux = photons->photon_flux;
-  const int all = level->texels.tile_count(), end = static_cast<int>(std::min<int64_t>(work.range.end, all));
+  const int all = level->texels->tile_count(), end = static_cast<int>(std::min<int64_t>(work.range.end, all));
   const int begin = static_cast<int>(std::min<int64_t>(work.range.begin, end));
+  if (begin == end) return MadeOutputs{{"lights", SerializeTiles({})}};
+  const int page = level->texels->PageOfTile(begin), first = level->texels->pages()[page].first_tile;
+  if (end > level->texels->pages()[page].end_tile()) return absl::InvalidArgumentError("tiles of more than one page");
+  const auto texels = level->texels->Page(page);
   std::vector<GatheredTiles> made(static_cast<size_t>(end - begin));
   ForEach(end - begin, [&](int i) {
     if (work.stop.stop_requested()) return;
-    made[i].lights = GatherTile(scene, level->layout, level->texels, begin + i, options, made[i].counters);
+    made[i].lights = GatherTile(scene, level->layout, *texels, begin - first + i, options, made[i].counters);
     Say("gather", ++tiles_done_, all);
   });
   if (work.stop.stop_requested()) return absl::CancelledError("stopped");
@@ -223,36 +220,36 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
   BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
-  Say("finish", pages_done_, std::ssize(level->texels.pages));
-  // The tasks' tiles are consecutive; range.end says with which tile they begin.
-  std::vector<TexelLight> lights(level->texels.texels.size());
-  if (work.range.end > static_cast<uint32_t>(level->texels.tile_count())) {
-    return absl::InvalidArgumentError("a page begins behind the last tile");
-  }
+  const int64_t pages = std::ssize(level->texels->pages());
+  Say("finish", pages_done_, pages);
   const int page = static_cast<int>(work.range.begin);
-  if (page >= static_cast<int>(level->texels.pages.size())) return absl::InvalidArgumentError("no such page");
+  if (work.range.begin >= pages) return absl::InvalidArgumentError("no such page");
+  if (static_cast<int64_t>(work.range.end) != level->texels->pages()[page].first_tile) {
+    return absl::InvalidArgumentError("the page begins with another tile");
+  }
+  const auto texels = level->texels->Page(page);
+  std::vector<TexelLight> lights(texels->texels.size());
   BakeTally tally;
-  const size_t first = level->texels.tile_begin[work.range.end];
-  size_t next = first;
+  size_t next = 0;
   for (const Blob& blob : InputsNamed(work.inputs, "lights")) {
     BAKEWELL_ASSIGN_OR_RETURN(const GatheredTiles tiles, ParseTiles(*blob));
-    if (tiles.lights.size() > lights.size() - next) return absl::InvalidArgumentError("more texels than the level has");
+    if (tiles.lights.size() > lights.size() - next) return absl::InvalidArgumentError("more texels than the page has");
     std::copy(tiles.lights.begin(), tiles.lights.end(), lights.begin() + static_cast<ptrdiff_t>(next));
     next += tiles.lights.size();
     tally.Count(tiles.counters);
   }
   FilterCounters filtered;
-  if (Filters(work.settings)) InArena([&] { FilterPage(level->texels, page, lights, filtered); });
+  if (Filters(work.settings)) InArena([&] { FilterPage(*texels, page, lights, filtered); });
   if (!work.settings.no_skip.Has(Skip::kShBands)) {
-    const GatherOptions asked = BudgetOf(work.settings, level->texels).gather;
+    const GatherOptions asked = BudgetOf(work.settings, level->texels->texel_count()).gather;
     SkipCount dropped;
-    DropBands(level->texels, page, asked.target_error, asked.floor_share, lights, dropped);
+    DropBands(*texels, page, asked.target_error, asked.floor_share, lights, dropped);
     tally.Count(Skip::kShBands, dropped);
   }
-  tally.Count(std::span(lights).subspan(first, next - first), filtered);
-  BAKEWELL_ASSIGN_OR_RETURN(MadeOutputs outputs, PageFiles(level->texels, lights, page));
+  tally.Count(std::span(lights).first(next), filtered);
+  BAKEWELL_ASSIGN_OR_RETURN(MadeOutputs outputs, PageFiles(*texels, lights, page));
   outputs.push_back({"tally", tally.Serialize()});
-  Say("finish", ++pages_done_, std::ssize(level->texels.pages));
+  Say("finish", ++pages_done_, pages);
   return outputs;
 }
 

@@ -42,7 +42,7 @@ DensityOptions DensityOf(const BakeSettings& settings) {
   return {.probe_unlit = settings.no_skip.Has(Skip::kUnfacedBacks)};
 }
 
-Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
+Budget BudgetOf(const BakeSettings& settings, int64_t texels) {
   const QualityNumbers numbers = NumbersOf(settings.quality);
   Budget budget;
   budget.gather.min_samples = settings.min_samples > 0 ? settings.min_samples : numbers.min_samples;
@@ -52,9 +52,8 @@ Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels) {
   budget.gather.seed = settings.seed;
   budget.gather.filter = Filters(settings);
   budget.gather.no_skip = settings.no_skip;
-  const int64_t texel_count = static_cast<int64_t>(texels.texels.size());
   budget.photons =
-      settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texel_count * numbers.photons_per_texel);
+      settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texels * numbers.photons_per_texel);
   return budget;
 }
 
@@ -66,33 +65,71 @@ absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout
   BAKEWELL_ASSIGN_OR_RETURN(level->world,
                             World::Build(level->scene, settings.backfaces, settings.albedo_limit, settings.no_skip));
   level->lights = std::make_unique<LightSet>(*level->world, level->scene.environment);
-  level->texels = RasterizeTexels(*level->world, level->layout, settings.footprint);
-  if (level->texels.texels.empty()) {
+  level->texels = std::make_unique<TexelPages>(*level->world, level->layout, settings.footprint);
+  if (level->texels->texel_count() == 0) {
     return absl::InvalidArgumentError(
         "no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");
   }
-  level->photons = BudgetOf(settings, level->texels).photons;
+  level->photons = BudgetOf(settings, level->texels->texel_count()).photons;
   return level;
 }
+
+namespace {
+
+// Where the guide's walks start, page by page.
+std::vector<TexelPoint> StartsOf(const Level& level, int walks, uint32_t seed) {
+  if (!EmissionGuide::Walks(*level.lights)) return {};
+  const TexelPages& texels = *level.texels;
+  std::vector<TexelPoint> points(static_cast<size_t>(walks));
+  for (int page = 0; page < static_cast<int>(texels.pages().size()); ++page) {
+    const TexelPages::PageCount& count = texels.pages()[static_cast<size_t>(page)];
+    const auto map = texels.Page(page);
+    for (int walk = 0; walk < walks; ++walk) {
+      const auto start = EmissionGuide::StartOf(walk, static_cast<size_t>(texels.texel_count()), seed);
+      const int64_t texel = static_cast<int64_t>(start.texel) - count.first_texel;
+      if (texel < 0 || texel >= count.texels) continue;
+      const TexelSampler sampler(*level.world, level.layout, *map, map->texels[static_cast<size_t>(texel)]);
+      points[static_cast<size_t>(walk)] = sampler.At(start.u);
+    }
+  }
+  return points;
+}
+
+// Adds the luminance that the photons brought to each texel to `sum`, in order.
+double AddIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache, double sum) {
+  for (const Texel& texel : texels.texels) {
+    const uint32_t triangle = texels.fragments[texel.fragment_begin].triangle;
+    const CellIrradiance& light = cache.irradiance[2 * static_cast<size_t>(cells.CellAt(triangle, texel.position))];
+    sum += static_cast<double>(Luminance(light.direct + light.indirect));
+  }
+  return sum;
+}
+
+}  // namespace
 
 std::shared_ptr<const PhotonStage> BuildPhotonStage(const Level& level, const BakeSettings& settings) {
   const int64_t count = level.photons;
   const int walks = static_cast<int>(std::min<int64_t>(count / 16, 100000));
   auto stage = std::make_shared<PhotonStage>();
-  stage->guide = EmissionGuide::Learn(*level.world, *level.lights, level.layout, level.texels, walks, settings.seed);
+  stage->guide =
+      EmissionGuide::Learn(*level.world, *level.lights, StartsOf(level, walks, settings.seed), settings.seed);
   stage->plan = PlanPhotons(*level.lights, stage->guide, count, settings.seed);
   stage->cells = SurfaceCells::Build(*level.world, CellsFor(count));
   return stage;
 }
 
 float MeanIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache) {
+  if (texels.texels.empty()) return 0;
+  return static_cast<float>(AddIrradiance(texels, cells, cache, 0) / static_cast<double>(texels.texels.size()));
+}
+
+float MeanIrradiance(const TexelPages& texels, const SurfaceCells& cells, const RadianceCache& cache) {
+  if (texels.texel_count() == 0) return 0;
   double sum = 0;
-  for (const Texel& texel : texels.texels) {
-    const uint32_t triangle = texels.fragments[texel.fragment_begin].triangle;
-    const CellIrradiance& light = cache.irradiance[2 * static_cast<size_t>(cells.CellAt(triangle, texel.position))];
-    sum += static_cast<double>(Luminance(light.direct + light.indirect));
+  for (int page = 0; page < static_cast<int>(texels.pages().size()); ++page) {
+    sum = AddIrradiance(*texels.Page(page), cells, cache, sum);
   }
-  return texels.texels.empty() ? 0 : static_cast<float>(sum / static_cast<double>(texels.texels.size()));
+  return static_cast<float>(sum / static_cast<double>(texels.texel_count()));
 }
 
 }  // namespace bakewell

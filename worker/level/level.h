@@ -11,6 +11,7 @@
 #include "worker/gather/skip.h"
 #include "worker/gather/tile.h"
 #include "worker/light/tree.h"
+#include "worker/texel/pages.h"
 
 namespace bakewell {
 
@@ -26,7 +27,7 @@ bool Filters(const BakeSettings& settings);
 // How the photons' density is estimated.
 DensityOptions DensityOf(const BakeSettings& settings);
 
-Budget BudgetOf(const BakeSettings& settings, const TexelMap& texels);
+Budget BudgetOf(const BakeSettings& settings, int64_t texels);
 
 // A scene with its charts, ready to be traced. Immutable; made once and shared by the tasks that need it.
 struct Level {
@@ -34,7 +35,7 @@ struct Level {
   AtlasLayout layout;
   std::unique_ptr<World> world;
   std::unique_ptr<LightSet> lights;
-  TexelMap texels;
+  std::unique_ptr<TexelPages> texels;
   int64_t photons = 0;  // to be emitted
 };
 // kInvalidArgument: no lightmapped surface covers a texel.
@@ -53,6 +54,7 @@ int64_t CellsFor(int64_t photons);
 
 // Mean luminance that the photons brought to the fronts of lightmapped surfaces, to judge errors against.
 float MeanIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache);
+float MeanIrradiance(const TexelPages& texels, const SurfaceCells& cells, const RadianceCache& cache);
 
 // Keeps the few values that were asked for last; threads that ask for the same key wait for one to make it.
 template <typename Value>

@@ -97,8 +97,36 @@ int EmissionGuide::SkyBin(int x, int y) const {
   return (y * kSkyRows / sky_height_) * kSkyColumns + x * kSkyColumns / sky_width_;
 }
 
+namespace {
+
+uint32_t WalkKey(int walk, uint32_t seed) {
+  return HashCombine(HashCombine(seed, 0x6a1d3u), static_cast<uint32_t>(walk));
+}
+
+}  // namespace
+
+EmissionGuide::Start EmissionGuide::StartOf(int walk, size_t texels, uint32_t seed) {
+  const uint32_t key = WalkKey(walk, seed);
+  const auto random = [&](uint32_t i) { return UnitFloat(HashCombine(key, i)); };
+  return {std::min(texels - 1, static_cast<size_t>(random(0) * static_cast<float>(texels))), {random(1), random(2)}};
+}
+
+bool EmissionGuide::Walks(const LightSet& lights) {
+  return !lights.directionals().empty() || lights.environment().bright();
+}
+
 EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, const AtlasLayout& layout,
                                    const TexelMap& map, int walks, uint32_t seed) {
+  std::vector<TexelPoint> starts;
+  for (int walk = 0; walk < walks && Walks(lights) && !map.texels.empty(); ++walk) {
+    const Start start = StartOf(walk, map.texels.size(), seed);
+    starts.push_back(TexelSampler(world, layout, map, map.texels[start.texel]).At(start.u));
+  }
+  return Learn(world, lights, starts, seed);
+}
+
+EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, std::span<const TexelPoint> starts,
+                                   uint32_t seed) {
   EmissionGuide guide;
   guide.sky_width_ = lights.environment().width();
   guide.sky_height_ = lights.environment().height();
@@ -106,8 +134,6 @@ EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, c
   Marks marks;
   marks.sun.assign(lights.directionals().size(), std::vector<float>(kSunGrid * kSunGrid, 0.0f));
   marks.sky.assign(static_cast<size_t>(kSkyColumns) * kSkyRows * kSkyGrid * kSkyGrid, 0.0f);
-  const bool needed = !lights.directionals().empty() || lights.environment().bright();
-  if (!needed || map.texels.empty()) walks = 0;
   const auto mark_sun = [&](const SurfacePoint& point, uint32_t key) {
     for (size_t s = 0; s < lights.directionals().size(); ++s) {
       const PunctualLight& sun = lights.directionals()[s];
@@ -128,14 +154,11 @@ EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, c
     marks.sky[static_cast<size_t>((guide.SkyBin(x, y) * kSkyGrid + Bin(p.y, kSkyGrid)) * kSkyGrid +
                                   Bin(p.x, kSkyGrid))] += 1;
   };
-  for (int walk = 0; walk < walks; ++walk) {
-    const uint32_t key = HashCombine(HashCombine(seed, 0x6a1d3u), static_cast<uint32_t>(walk));
+  for (size_t walk = 0; walk < starts.size(); ++walk) {
+    const uint32_t key = WalkKey(static_cast<int>(walk), seed);
     const auto random = [&](int i) { return UnitFloat(HashCombine(key, static_cast<uint32_t>(i))); };
-    const size_t which =
-        std::min(map.texels.size() - 1, static_cast<size_t>(random(0) * static_cast<float>(map.texels.size())));
-    const TexelPoint start = TexelSampler(world, layout, map, map.texels[which]).At({random(1), random(2)});
-    SurfacePoint at = start.surface;
-    Frame frame = start.frame;
+    SurfacePoint at = starts[walk].surface;
+    Frame frame = starts[walk].frame;
     for (int step = 0; step < kMaxWalk; ++step) {
       const Vec3f dir = frame.ToWorld(CosineHemisphere({random(10 * step + 10), random(10 * step + 11)}));
       const Hit hit = world.Intersect(RayFrom(at, dir, kInfinity, key + static_cast<uint32_t>(step)));

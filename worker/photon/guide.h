@@ -1,11 +1,12 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "core/artifact/progress.h"
 #include "worker/light/lights.h"
 #include "worker/sample/distribution.h"
-#include "worker/texel/texels.h"
+#include "worker/texel/sampler.h"
 
 namespace bakewell {
 
@@ -19,7 +20,18 @@ class EmissionGuide {
   static constexpr int kSunGrid = 64, kSkyGrid = 16, kSkyColumns = 16, kSkyRows = 8;
   static constexpr float kUniformShare = 0.1f;
 
-  // walks: number of pilot paths. Keyed by seed.
+  // Where pilot walk `walk` starts: at point `u` of texel `texel` of `texels`.
+  struct Start {
+    size_t texel = 0;
+    Vec2f u;
+  };
+  static Start StartOf(int walk, size_t texels, uint32_t seed);
+  // False where no light needs a pilot.
+  static bool Walks(const LightSet& lights);
+  // starts[walk] is the point that StartOf(walk) means, if Walks(lights). Keyed by seed.
+  static EmissionGuide Learn(const World& world, const LightSet& lights, std::span<const TexelPoint> starts,
+                             uint32_t seed);
+  // The same over texels that are all there. walks: number of pilot paths.
   static EmissionGuide Learn(const World& world, const LightSet& lights, const AtlasLayout& layout, const TexelMap& map,
                              int walks, uint32_t seed);
 

@@ -41,12 +41,13 @@ int32_t ChartOf(const World& world, const AtlasLayout& layout, uint32_t triangle
   return charts.index.empty() ? kNoChart : charts.chart_of_triangle[t.index_in_object];
 }
 
-std::vector<Piece> ClipAll(const World& world, const AtlasLayout& layout) {
+std::vector<Piece> ClipAll(const World& world, const AtlasLayout& layout, int only_page) {
   std::vector<Piece> pieces;
   for (uint32_t k = 0; k < world.triangles().size(); ++k) {
     const int32_t chart = ChartOf(world, layout, k);
     if (chart == kNoChart) continue;
     const int page = layout.charts[chart].page;
+    if (only_page != kAllPages && page != only_page) continue;
     const PageSize size = layout.pages[page];
     const auto [a, b, c] = TexelCorners(world, layout, k);
     RasterizeExact(a, b, c, size.width, size.height, [&](int x, int y, const ConvexPolygon& polygon) {
@@ -123,14 +124,17 @@ std::array<Vec2d, 3> TexelCorners(const World& world, const AtlasLayout& layout,
   return corners;
 }
 
-TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout, float footprint) {
+TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout, float footprint, int page) {
   TexelMap map;
   map.footprint = footprint;
   map.pages = layout.pages;
-  for (const PageSize& page : layout.pages) {
-    map.texel_at.emplace_back(static_cast<size_t>(page.width) * static_cast<size_t>(page.height), -1);
+  map.texel_at.resize(layout.pages.size());
+  for (size_t p = 0; p < layout.pages.size(); ++p) {
+    if (page != kAllPages && static_cast<size_t>(page) != p) continue;
+    map.texel_at[p].assign(static_cast<size_t>(layout.pages[p].width) * static_cast<size_t>(layout.pages[p].height),
+                           -1);
   }
-  const std::vector<Piece> pieces = ClipAll(world, layout);
+  const std::vector<Piece> pieces = ClipAll(world, layout, page);
   std::pair<int32_t, int32_t> tile{-1, -1};
   for (size_t begin = 0, end = 0; begin < pieces.size(); begin = end) {
     while (end < pieces.size() && pieces[end].Place() == pieces[begin].Place()) ++end;

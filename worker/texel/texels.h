@@ -46,8 +46,12 @@ struct TexelMap {
 
 inline constexpr int kTileSide = 16;
 
+inline constexpr int kAllPages = -1;
+
 // Rasterises every charted triangle exactly: area of texel and triangle clipped, not centres. footprint is in (0, 1].
-TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout, float footprint);
+// Of one page only, where it is named: the same texels, numbered from that page's first; other pages' texel_at is
+// empty.
+TexelMap RasterizeTexels(const World& world, const AtlasLayout& layout, float footprint, int page = kAllPages);
 
 // Corners of a charted triangle on its page [texels].
 std::array<Vec2d, 3> TexelCorners(const World& world, const AtlasLayout& layout, uint32_t triangle);

@@ -1,6 +1,7 @@
 #include "worker/trace/world.h"
 
 #include <embree3/rtcore.h>
+#include <immintrin.h>
 
 #include <cstring>
 #include <limits>
@@ -203,13 +204,27 @@ bool World::Passes(uint32_t triangle, float u, float v, Vec3f dir, uint32_t key)
   return UnitFloat(HashCombine(key, triangle)) >= alpha;
 }
 
+namespace {
+
+// Stored by whole vectors, as Embree loads them: a load that spans several stores waits until all are in the cache.
+void Fill(const Ray& ray, RTCRay& query) {
+  const Vec3f o = ray.origin, d = ray.dir;
+  _mm_store_ps(&query.org_x, _mm_setr_ps(o.x, o.y, o.z, 0));
+  _mm_store_ps(&query.dir_x, _mm_setr_ps(d.x, d.y, d.z, 0));
+  query.tfar = ray.t_max;
+  query.mask = ~0u;
+  query.id = query.flags = 0;
+}
+
+}  // namespace
+
 Hit World::Intersect(const Ray& ray) const {
   TraceContext context;
   rtcInitIntersectContext(&context.rtc);
   context.world = this;
   context.ray = &ray;
   RTCRayHit query;
-  query.ray = {ray.origin.x, ray.origin.y, ray.origin.z, 0, ray.dir.x, ray.dir.y, ray.dir.z, 0, ray.t_max, ~0u, 0, 0};
+  Fill(ray, query.ray);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(device_->scene, &context.rtc, &query);
@@ -228,7 +243,8 @@ bool World::Occluded(const Ray& ray) const {
   rtcInitIntersectContext(&context.rtc);
   context.world = this;
   context.ray = &ray;
-  RTCRay query{ray.origin.x, ray.origin.y, ray.origin.z, 0, ray.dir.x, ray.dir.y, ray.dir.z, 0, ray.t_max, ~0u, 0, 0};
+  RTCRay query;
+  Fill(ray, query);
   rtcOccluded1(device_->scene, &context.rtc, &query);
   return query.tfar < 0;
 }

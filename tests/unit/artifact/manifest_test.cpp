@@ -23,6 +23,7 @@ TEST(Manifest, SaysWhatItWasGiven) {
   manifest.settings_json = R"({"quality":"HIGH"})";
   manifest.phases = {{"chart", 1, 2}, {"gather", 3, 5}};
   manifest.counters = {{"gather/rays", 7}, {"skip/no_light/enabled", 1}, {"skip/no_light/of", 3}};
+  manifest.peak_memory_bytes = 4096;
   manifest.warnings = {"no normals"};
   manifest.files = {DescribeFile(folder / "abc", "irradiance").value()};
   ASSERT_TRUE(WriteManifest(folder.Path(), manifest).ok());
@@ -37,6 +38,7 @@ TEST(Manifest, SaysWhatItWasGiven) {
   EXPECT_EQ(json["statistics"]["counters"].size(), 1u);
   EXPECT_EQ(json["statistics"]["skip"]["no_light"]["enabled"], true);
   EXPECT_EQ(json["statistics"]["skip"]["no_light"]["of"], 3);
+  EXPECT_EQ(json["statistics"]["peak_memory_bytes"], 4096);
   EXPECT_EQ(json["warnings"][0], "no normals");
   EXPECT_EQ(json["files"][0]["name"], "abc");
   EXPECT_EQ(json["files"][0]["size_bytes"], 3);
@@ -50,6 +52,7 @@ TEST(Manifest, EmptyListsAreListsAndNanIsNull) {
   EXPECT_EQ(json["files"], Json::array());
   EXPECT_EQ(json["statistics"]["counters"], Json::object());
   EXPECT_TRUE(json["statistics"]["estimated_error"].is_null());
+  EXPECT_TRUE(json["statistics"]["peak_memory_bytes"].is_null());
 }
 
 TEST(Manifest, SettingsThatAreNoObjectAreRefused) {
