@@ -109,6 +109,34 @@ TEST_F(FarmTest, EstimateCountsWhatIsKnown) {
   EXPECT_EQ(after->run_us_high(), 0);
 }
 
+TEST_F(FarmTest, EstimateIsOfMeasuredCostsAlsoAfterARestartAndKeysAreNot) {
+  Farm farm(FastOptions(dir.path()));
+  scene.two_stages = false;
+  SyntheticScene other = scene;
+  other.seed = 99;
+  const auto guess = farm.Client()->Estimate(other.Text(), {});
+  ASSERT_TRUE(guess.ok()) << guess.status();
+  // Tasks take ten times what the planner thinks.
+  Farm::RunningWorker& worker = farm.AddWorker("w");
+  worker.executor.before = [this](const TaskSpec&) {
+    std::this_thread::sleep_for(std::chrono::microseconds(9 * scene.work_us));
+    return absl::OkStatus();
+  };
+  farm.Bake(scene);
+  const auto learnt = farm.Client()->Estimate(other.Text(), {});
+  EXPECT_GT(learnt->run_us_low(), 6 * guess->run_us_low());
+  EXPECT_LT(learnt->run_us_low(), 40 * guess->run_us_low()) << "not by what a loaded machine adds to a sleep";
+  farm.StopCoordinator();
+  farm.StartCoordinator();
+  const auto after = farm.Client()->Estimate(other.Text(), {});
+  EXPECT_GT(after->run_us_low(), 6 * guess->run_us_low());
+  // What was learnt changes no key: the same scene again runs nothing.
+  const int runs = worker.executor.runs;
+  const v1::Job again = farm.Bake(scene, "again");
+  EXPECT_EQ(again.tasks_known(), again.tasks_total());
+  EXPECT_EQ(worker.executor.runs, runs);
+}
+
 TEST_F(FarmTest, FetchWritesTheArtifactsAndResumes) {
   Farm farm(FastOptions(dir.path() / "farm"));
   farm.AddWorker("w");

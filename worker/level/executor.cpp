@@ -4,6 +4,9 @@
 #include <absl/strings/str_cat.h>
 #include <tbb/parallel_for.h>
 
+#include <map>
+
+#include "core/artifact/page_preview.h"
 #include "core/atlas/serialize.h"
 #include "core/scene/canonical.h"
 #include "proto/settings.h"
@@ -56,6 +59,25 @@ Digest KeyOfInputs(const TaskSpec& spec, std::initializer_list<absl::string_view
   }
   writer.PutString(more);
   return Sha256Of(writer.bytes());
+}
+
+// What the tiles [begin, end) look like: an output for each page that they lie on.
+MadeOutputs Previews(const TexelMap& map, int begin, std::span<const GatheredTiles> tiles) {
+  std::map<int, PreviewBuilder> pages;
+  for (size_t i = 0; i < tiles.size(); ++i) {
+    const Texel* texel = &map.texels[map.tile_begin[static_cast<size_t>(begin) + i]];
+    for (const TexelLight& light : tiles[i].lights) {
+      const PageSize size = map.pages[static_cast<size_t>(texel->page)];
+      PreviewBuilder& page = pages.try_emplace(texel->page, size.width, size.height).first->second;
+      if (light.valid) page.Add(texel->x, texel->y, light.irradiance);
+      ++texel;
+    }
+  }
+  MadeOutputs outputs;
+  for (auto& [page, builder] : pages) {
+    outputs.push_back({absl::StrCat(level_task::kPreviewPrefix, page), SerializePreview(builder.Take())});
+  }
+  return outputs;
 }
 
 // Level and photons do not depend on how well texels are to be gathered.
@@ -212,7 +234,9 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
     Say("gather", ++tiles_done_, all);
   });
   if (work.stop.stop_requested()) return absl::CancelledError("stopped");
-  return MadeOutputs{{"lights", SerializeTiles(Joined(made))}};
+  MadeOutputs outputs = Previews(level->texels, begin, made);
+  outputs.push_back({"lights", SerializeTiles(Joined(made))});
+  return outputs;
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {

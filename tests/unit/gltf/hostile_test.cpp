@@ -9,7 +9,8 @@
 
 #include "client/gltf/level.h"
 #include "tests/support/gltf_builder.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/peak_memory.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -35,7 +36,7 @@ GltfBuilder RichGltf() {
   return builder;
 }
 
-absl::Status LoadBytes(const std::string& bytes, const TempFolder& folder, const char* name = "hostile.glb") {
+absl::Status LoadBytes(const std::string& bytes, const TempDir& folder, const char* name = "hostile.glb") {
   std::ofstream(folder / name, std::ios::binary) << bytes;
   return LoadLevel(folder / name).status();
 }
@@ -49,13 +50,13 @@ uint64_t Random(uint64_t key) {
 }
 
 TEST(HostileLevel, RichFileIsFineBeforeItIsBroken) {
-  const TempFolder folder;
+  const TempDir folder;
   EXPECT_TRUE(LoadBytes(RichGltf().Glb(), folder).ok());
   EXPECT_TRUE(LoadBytes(RichGltf().Gltf(), folder, "hostile.gltf").ok());
 }
 
 TEST(HostileLevel, EveryPrefixIsRefused) {
-  const TempFolder folder;
+  const TempDir folder;
   const std::string glb = RichGltf().Glb();
   for (size_t size = 0; size < glb.size(); ++size) {
     const absl::Status status = LoadBytes(glb.substr(0, size), folder);
@@ -65,7 +66,7 @@ TEST(HostileLevel, EveryPrefixIsRefused) {
 }
 
 TEST(HostileLevel, ByteFlipsNeverCrash) {
-  const TempFolder folder;
+  const TempDir folder;
   const std::string glb = RichGltf().Glb();
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   int tried = 0;
@@ -334,7 +335,7 @@ const Attack kAttacks[] = {
 };
 
 TEST(HostileLevel, EachAttackGivesOneErrorThatNamesFileAndObject) {
-  const TempFolder folder;
+  const TempDir folder;
   for (const Attack& attack : kAttacks) {
     GltfBuilder builder = QuadGltf();
     attack.apply(builder);
@@ -345,8 +346,82 @@ TEST(HostileLevel, EachAttackGivesOneErrorThatNamesFileAndObject) {
   }
 }
 
+// A few hundred bytes that ask for a thousand million of something.
+const Attack kCrowds[] = {
+    {"instances of nothing",
+     [](GltfBuilder& b) {
+       const int where = b.AddVec3({{0, 0, 0}});
+       b.json["accessors"][static_cast<size_t>(where)]["count"] = 1'000'000'000;
+       b.json["accessors"][static_cast<size_t>(where)].erase("bufferView");
+       b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", where}};
+     },
+     "with it the scene has 2e+09 triangles"},
+    {"instances that lie",
+     [](GltfBuilder& b) {
+       const int where = b.AddVec3({{0, 0, 0}});
+       b.json["accessors"][static_cast<size_t>(where)]["count"] = 1'000'000'000;
+       b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", where}};
+     },
+     "with it the scene has 2e+09 triangles"},
+    {"instances of few vertices and many triangles",
+     [](GltfBuilder& b) {
+       const int where = b.AddVec3(std::vector<Vec3f>(100'000, Vec3f{}));
+       Primitive(b)["indices"] = b.AddIndices(std::vector<uint32_t>(30'000, 0));
+       b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", where}};
+     },
+     "with it the scene has 1e+09 triangles"},
+    {"nodes of one mesh",
+     [](GltfBuilder& b) {
+       Primitive(b)["indices"] = b.AddIndices(std::vector<uint32_t>(300'000, 0));
+       json& roots = b.json["scenes"][0]["nodes"];
+       for (int i = 0; i < 10'000; ++i) {
+         roots.push_back(b.json["nodes"].size());
+         b.json["nodes"].push_back({{"mesh", 0}});
+       }
+     },
+     "triangles"},
+    {"vertices",
+     [](GltfBuilder& b) {
+       for (int i = 0; i < 4; ++i) b.json["accessors"][i]["count"] = 4'000'000'000;
+     },
+     "4e+09 vertices"},
+    {"indices",
+     [](GltfBuilder& b) {
+       const int index = b.AddIndices({0, 1, 2});
+       b.json["accessors"][static_cast<size_t>(index)]["count"] = 3'000'000'000;
+       Primitive(b)["indices"] = index;
+     },
+     "1e+09 triangles"},
+    {"indices of nothing",
+     [](GltfBuilder& b) {
+       const int index = b.AddIndices({0, 1, 2});
+       b.json["accessors"][static_cast<size_t>(index)]["count"] = 3'000'000'000;
+       b.json["accessors"][static_cast<size_t>(index)].erase("bufferView");
+       Primitive(b)["indices"] = index;
+     },
+     "invalid bufferView"},
+};
+
+TEST(HostileLevel, CrowdsAreRefusedInBoundedMemoryAndTime) {
+  const TempDir folder;
+  for (const Attack& attack : kCrowds) {
+    GltfBuilder builder = QuadGltf();
+    attack.apply(builder);
+    WriteQuickly(folder / "hostile.glb", builder.Glb());
+    const PeakMemory memory;
+    const auto start = std::chrono::steady_clock::now();
+    const absl::Status status = LoadLevel(folder / "hostile.glb").status();
+    const auto took = std::chrono::steady_clock::now() - start;
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << attack.name << ": " << status;
+    EXPECT_THAT(std::string(status.message()), HasSubstr(attack.message)) << attack.name;
+    // What was asked for is 10 GB and more. The file has 2 MB at most, some 12,000 nodes and 100,000 instances.
+    EXPECT_LT(memory.GrownMegabytes(), 128) << attack.name;
+    EXPECT_LT(took, std::chrono::seconds(5)) << attack.name;
+  }
+}
+
 TEST(HostileLevel, MissingFilesAreNotFound) {
-  const TempFolder folder;
+  const TempDir folder;
   const absl::Status level = LoadLevel(folder / "nothing.glb").status();
   EXPECT_EQ(level.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(level.message()), HasSubstr("nothing.glb"));
@@ -358,7 +433,7 @@ TEST(HostileLevel, MissingFilesAreNotFound) {
 }
 
 TEST(HostileLevel, LinksOutOfTheFolderAreNotFollowed) {
-  const TempFolder folder, elsewhere;
+  const TempDir folder, elsewhere;
   std::ofstream(elsewhere / "secret.png") << "secret";
   std::filesystem::create_symlink(elsewhere / "secret.png", folder / "link.png");
   GltfBuilder builder = QuadGltf();
@@ -367,7 +442,7 @@ TEST(HostileLevel, LinksOutOfTheFolderAreNotFollowed) {
 }
 
 TEST(HostileLevel, DeepNestingCostsNoStack) {
-  const TempFolder folder;
+  const TempDir folder;
   const std::string deep(1000000, '[');
   EXPECT_THAT(std::string(LoadBytes(deep, folder, "deep.gltf").message()), HasSubstr("nested deeper than"));
   // A chain of nodes is no nesting of JSON, and is fine.
@@ -378,7 +453,7 @@ TEST(HostileLevel, DeepNestingCostsNoStack) {
 }
 
 TEST(HostileLevel, GlbHeaderIsChecked) {
-  const TempFolder folder;
+  const TempDir folder;
   std::string glb = QuadGltf().Glb();
   glb[4] = 1;
   EXPECT_THAT(std::string(LoadBytes(glb, folder).message()), HasSubstr("version 1 is not 2"));
