@@ -137,6 +137,28 @@ TEST_F(FarmTest, EstimateIsOfMeasuredCostsAlsoAfterARestartAndKeysAreNot) {
   EXPECT_EQ(worker.executor.runs, runs);
 }
 
+// Symptom: a coordinator that was killed while photons flew took a part of them for all, and so did every later job.
+TEST_F(FarmTest, WhatAStoppedTaskHandsInIsNoResult) {
+  scene.work_us = 400'000;
+  scene.width = 2;
+  scene.layers = 1;
+  Farm quiet(FastOptions(dir.path() / "quiet"));
+  quiet.AddWorker("w");
+  const std::string right = DigestsOf(quiet.Bake(scene));
+  Farm farm(FastOptions(dir.path() / "farm"));
+  Farm::RunningWorker& worker = farm.AddWorker("w");
+  worker.executor.careless = true;
+  const auto client = farm.Client();
+  const auto job = client->Submit(scene.Text(), {});
+  ASSERT_TRUE(job.ok()) << job.status();
+  ASSERT_TRUE(WaitFor([&] { return worker.executor.runs > 0; }));
+  ASSERT_TRUE(client->Cancel(job->job_id()).ok());
+  ASSERT_TRUE(WaitFor([&] { return client->Workers()->workers(0).leases() == 0; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // what it hands in would have come
+  worker.executor.careless = false;
+  EXPECT_EQ(DigestsOf(farm.Bake(scene, "again")), right);
+}
+
 TEST_F(FarmTest, FetchWritesTheArtifactsAndResumes) {
   Farm farm(FastOptions(dir.path() / "farm"));
   farm.AddWorker("w");

@@ -2,14 +2,18 @@
 #include <gtest/gtest.h>
 
 #include "client/gltf/level.h"
+#include "core/artifact/level_task.h"
+#include "core/base/fields.h"
 #include "core/image/png.h"
 #include "core/scene/canonical.h"
 #include "proto/bakewell/v1/settings.pb.h"
 #include "proto/settings.h"
+#include "server/level/chart_task.h"
 #include "server/plan/level_planner.h"
 #include "tests/support/farm.h"
 #include "tests/support/level_farm.h"
 #include "tests/support/temp_dir.h"
+#include "worker/level/executor.h"
 
 namespace bakewell::test {
 namespace {
@@ -80,6 +84,32 @@ TEST(LevelFarm, PagesCanBeLookedAtWhileTheyAreGathered) {
   EXPECT_EQ(client.FetchPreview(job->id(), gone, dir.path()).code(), absl::StatusCode::kNotFound);
   gone.set_name("../preview-0.png");
   EXPECT_EQ(client.FetchPreview(job->id(), gone, dir.path()).code(), absl::StatusCode::kDataLoss);
+}
+
+TEST(LevelExecutor, StoppedPhotonsAreNoResult) {
+  const auto level = LoadLevel(std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb");
+  ASSERT_TRUE(level.ok()) << level.status();
+  const std::vector<std::byte> bytes = SerializeScene(level->scene);
+  const std::string scene(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  BakeSettings settings;
+  settings.quality = Quality::kPreview;
+  settings.resolution = 32;
+  const std::string task = level_task::Serialize({SettingsJson(settings), 0, 1});
+  const auto layout =
+      ChartTasks()[0].run({level_task::kChart.kind, level_task::kChart.code_version, task, {}}, {scene});
+  ASSERT_TRUE(layout.ok()) << layout.status();
+  TaskSpec spec{level_task::kEmit.kind, level_task::kEmit.code_version, task, {}};
+  TaskInputs inputs;
+  for (const auto& [name, blob] :
+       {std::pair<std::string, std::string>("scene", scene), {"layout", (*layout)[0].bytes}}) {
+    spec.inputs.push_back({name, Sha256Of(blob)});
+    inputs.emplace_back(name, std::make_shared<const std::string>(blob));
+  }
+  LevelExecutor executor;
+  EXPECT_TRUE(executor.Run(spec, inputs, {}).ok());
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_TRUE(absl::IsCancelled(executor.Run(spec, inputs, stop.get_token()).status()));
 }
 
 TEST(LevelFarm, HostileSettingsAndScenesAreRefusedAtSubmit) {

@@ -189,6 +189,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Emit(const Work& work) {
     EmitPhotons(*level->world, *level->lights, stage->guide, stage->cells, stage->plan, begin, end, progress, map);
     Say("photons", photons_done_ += end - begin, photons);
   });
+  if (work.stop.stop_requested()) return absl::CancelledError("stopped");  // not all photons flew
   return MadeOutputs{{"flux", SerializePhotons(map)}};
 }
 
