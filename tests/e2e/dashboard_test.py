@@ -87,7 +87,7 @@ class Dashboard(unittest.TestCase):
         page.go(farm.http)
         page.wait_for("document.querySelector('#jobs').innerText.includes('No job yet')")
         page.wait_for("document.querySelector('#workers').innerText.includes('oven')")
-        submitted = farm.client("submit", SCENE, "--quality", "high", "--resolution", "160", "--name", "hall")
+        submitted = farm.client("submit", SCENE, "--quality", "high", "--resolution", "128", "--name", "hall")
         self.assertEqual(submitted.returncode, 0, submitted.stderr)
 
         # The worker stops in the middle of the tiles: what the page shows then can be looked at in peace.

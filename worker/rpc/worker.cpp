@@ -170,10 +170,8 @@ absl::Status Worker::Run() {
   std::thread leaver([this] {
     while (!ShouldLeave()) {
       std::unique_lock lock(mutex_);
-      // Only who may leave by the clock looks at it.
-      const bool was_draining = draining_, hurries = draining_ || options_.once || options_.idle_exit.count() > 0;
-      changed_.wait_for(lock, std::chrono::milliseconds(hurries ? 50 : 5000),
-                        [&] { return ended_ || draining_ != was_draining || (draining_ && tasks_.empty()); });
+      changed_.wait_for(lock, std::chrono::milliseconds(50),
+                        [this] { return ended_ || (draining_ && tasks_.empty()); });
     }
     link_.HangUp();
   });
@@ -243,9 +241,9 @@ void Worker::HeartbeatLoop() {
   Clock::time_point beat{};
   std::unique_lock lock(mutex_);
   while (!ended_) {
-    // A registration, also one that asks for faster heartbeats than were in force before, ends the wait.
-    const auto due = worker_id_ == 0 ? Clock::now() + heartbeat_ : beat + heartbeat_;
-    changed_.wait_until(lock, due, [this, id = worker_id_] { return ended_ || worker_id_ != id; });
+    // Short waits, since a registration may ask for faster heartbeats than were in force before.
+    changed_.wait_for(lock, std::min<std::chrono::microseconds>(heartbeat_, std::chrono::milliseconds(100)),
+                      [this] { return ended_; });
     if (ended_ || worker_id_ == 0 || Clock::now() - beat < heartbeat_) continue;
     beat = Clock::now();
     const uint64_t id = worker_id_;
