@@ -172,6 +172,12 @@ absl::Status Fetch(FarmFlags& flags, const Console& console) {
   for (const v1::Artifact& artifact : job.artifacts()) {
     console.out << (fs::path(flags.output) / artifact.name()).string() << "\n";
   }
+  for (const v1::Preview& preview : job.previews()) {
+    const absl::Status status = client->FetchPreview(job.id(), preview, flags.output);
+    if (absl::IsNotFound(status)) continue;  // the job has ended meanwhile
+    BAKEWELL_RETURN_IF_ERROR(status);
+    console.out << (fs::path(flags.output) / preview.name()).string() << "\n";
+  }
   return absl::OkStatus();
 }
 

@@ -13,9 +13,11 @@ struct PhaseShare {
   double share;
 };
 
-// Of an interior scene at medium quality. They add up to 1.
-constexpr std::array<PhaseShare, 7> kShares = {{{"chart", 0.02},
+// Of an interior scene at medium quality. Without the preview, which --density signal alone makes, they add up to 1.
+constexpr std::string_view kPreview = "preview";
+constexpr std::array<PhaseShare, 8> kShares = {{{"chart", 0.02},
                                                 {"texels", 0.03},
+                                                {kPreview, 0.15},
                                                 {"photons", 0.15},
                                                 {"density", 0.05},
                                                 {"gather", 0.70},
@@ -27,13 +29,16 @@ struct Place {
 };
 
 // The shares before and of a phase; nothing for a phase that is not known.
-std::optional<Place> PlaceOf(std::string_view phase) {
+std::optional<Place> PlaceOf(std::string_view phase, bool previewed) {
   double before = 0;
+  std::optional<Place> place;
   for (const PhaseShare& entry : kShares) {
-    if (entry.phase == phase) return Place{before, entry.share};
-    before += entry.share;
+    const double share = entry.phase == kPreview && !previewed ? 0 : entry.share;
+    if (entry.phase == phase) place = {before, share};
+    before += share;
   }
-  return std::nullopt;
+  if (place) *place = {place->before / before, place->share / before};
+  return place;
 }
 
 }  // namespace
@@ -45,9 +50,10 @@ void ProgressEstimate::Report(std::string_view phase, int64_t done, int64_t tota
     phase_start_ = now;
     done_ = 0;
   }
+  previewed_ = previewed_ || phase == kPreview;
   done_ = std::clamp<int64_t>(done, std::min(done_, total), total);
   total_ = total;
-  if (const std::optional<Place> place = PlaceOf(phase_)) {
+  if (const std::optional<Place> place = PlaceOf(phase_, previewed_)) {
     fraction_ = std::max(fraction_, std::min(place->before + place->share * PhaseFraction(), 1.0));
   }
 }
@@ -55,7 +61,7 @@ void ProgressEstimate::Report(std::string_view phase, int64_t done, int64_t tota
 std::optional<std::chrono::duration<double>> ProgressEstimate::TimeLeft(Time now) const {
   constexpr std::chrono::duration<double> kTooEarly(1);
   constexpr double kTooLittle = 0.02;
-  const std::optional<Place> place = PlaceOf(phase_);
+  const std::optional<Place> place = PlaceOf(phase_, previewed_);
   if (!place || now - *start_ < kTooEarly || PhaseFraction() < kTooLittle) return std::nullopt;
   const std::chrono::duration<double> in_phase = now - *phase_start_;
   const std::chrono::duration<double> phase_left = in_phase * ((1 - PhaseFraction()) / PhaseFraction());

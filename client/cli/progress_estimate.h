@@ -33,6 +33,7 @@ class ProgressEstimate {
   std::string phase_;
   int64_t done_ = 0, total_ = 0;
   double fraction_ = 0;
+  bool previewed_ = false;
   std::optional<Time> start_, phase_start_;
 };
 

@@ -11,6 +11,7 @@ namespace {
 // Nobody here is far away, silent or slow in a way that another worker could mend: a process that was stopped for an
 // hour goes on where it was.
 constexpr std::chrono::hours kPatience(24 * 365);
+constexpr double kAnyNumber = std::numeric_limits<double>::infinity();
 constexpr int64_t kAnyBytes = int64_t{1} << 42;
 // What one thread does in a task: small enough to report and to share out, large enough to cost nothing.
 constexpr std::chrono::seconds kTaskOfAThread(2);
@@ -38,7 +39,7 @@ WorkerOptions OptionsOfWorker(int threads) {
 }  // namespace
 
 EmbeddedFarm::EmbeddedFarm(int threads, Progress& progress)
-    : planner_({threads * kTaskOfAThread, std::numeric_limits<double>::infinity()}), executor_({threads, &progress}) {}
+    : planner_({threads * kTaskOfAThread, kAnyNumber, kAnyNumber}), executor_({threads, &progress}) {}
 
 absl::StatusOr<std::unique_ptr<EmbeddedFarm>> EmbeddedFarm::Start(const std::filesystem::path& folder, int threads,
                                                                   const std::string& layout, Progress& progress) {

@@ -279,6 +279,23 @@ absl::Status FarmClient::FetchAll(const v1::Job& job, const fs::path& folder) {
   return absl::OkStatus();
 }
 
+absl::Status FarmClient::FetchPreview(int64_t job, const v1::Preview& preview, const fs::path& folder) {
+  if (!IsPlainPath(preview.name())) {
+    return absl::DataLossError(absl::StrCat("refusing the name '", preview.name(), "' of a preview"));
+  }
+  const fs::path path = folder / preview.name(), part = path.string() + ".part";
+  std::error_code error;
+  fs::create_directories(path.parent_path(), error);
+  // It may have grown since an earlier try: always the whole.
+  const absl::Status status = Retry([&] {
+    fs::remove(part, error);
+    return FetchOnce(job, preview.name(), part);
+  });
+  if (status.ok()) return SyncAndRename(part, path);
+  fs::remove(part, error);
+  return status;
+}
+
 absl::StatusOr<v1::ListWorkersResponse> FarmClient::Workers() {
   v1::ListWorkersResponse response;
   const absl::Status status = Retry([&] {

@@ -54,6 +54,9 @@ class FarmClient {
   // All of the job's artifacts.
   absl::Status FetchAll(const v1::Job& job, const std::filesystem::path& folder);
 
+  // Writes a picture that fills in to FOLDER/NAME, as it is now. kNotFound once its job has ended.
+  absl::Status FetchPreview(int64_t job, const v1::Preview& preview, const std::filesystem::path& folder);
+
   absl::StatusOr<v1::ListWorkersResponse> Workers();
   absl::StatusOr<v1::StatusResponse> Status();
   absl::Status DrainWorker(uint64_t worker, bool draining);

@@ -16,7 +16,7 @@ namespace bakewell::level_task {
 //   texel/survey    scene layout                   -> survey
 //   photon/emit     scene layout                   -> flux         range: photon batch begin of end
 //   photon/density  scene layout flux0 flux1 ...   -> cache, totals
-//   gather/tiles    scene layout cache             -> lights       range: tiles [begin, end)
+//   gather/tiles    scene layout cache             -> lights, preview-P (page P)   range: tiles [begin, end)
 //   finish/page     scene layout lights0 ...       -> the files of page begin, tally
 //   finish/report   survey totals tally0 ...       -> statistics.json (bake_report.h)
 // The version of a kind is raised whenever its bytes change for equal inputs.
@@ -28,7 +28,7 @@ inline constexpr KindName kChart{"chart/layout", 2};
 inline constexpr KindName kSurvey{"texel/survey", 3};
 inline constexpr KindName kEmit{"photon/emit", 3};
 inline constexpr KindName kDensity{"photon/density", 3};
-inline constexpr KindName kGather{"gather/tiles", 4};
+inline constexpr KindName kGather{"gather/tiles", 5};
 inline constexpr KindName kFinish{"finish/page", 4};
 inline constexpr KindName kReport{"finish/report", 4};
 inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};
@@ -36,6 +36,10 @@ inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, k
 // The artifacts that are no files of the result: they say how to write scene.glb and the manifest.
 inline constexpr char kLayoutArtifact[] = "atlas-layout.bin";
 inline constexpr char kReportArtifact[] = "statistics.json";
+
+// An output of any task whose name begins so is a SerializePreview() blob (page_preview.h) of the picture of that name:
+// what a coordinator shows of a job that runs.
+inline constexpr char kPreviewPrefix[] = "preview-";
 
 // TaskSpec::settings of all of them. `settings_json` is proto/settings.h SettingsJson() of the settings that the kind
 // looks at, the others being the defaults.

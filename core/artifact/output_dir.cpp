@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstdlib>
 #include <string>
 #include <utility>
@@ -51,19 +50,29 @@ int TryLock(const fs::path& folder) {
   return -1;
 }
 
-bool IsOld(const fs::path& folder) {
-  constexpr auto kTimeToTakeTheLock = std::chrono::minutes(1);
-  std::error_code error;
-  const auto written = fs::last_write_time(folder, error);
-  return !error && fs::file_time_type::clock::now() - written > kTimeToTakeTheLock;
-}
+// Holds the lock of a folder, if the file system has locks; waits for whoever has it.
+class FolderLock {
+ public:
+  explicit FolderLock(const fs::path& folder) : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    while (fd_ >= 0 && ::flock(fd_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+  }
+  ~FolderLock() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  const int fd_;
+};
 
 // A staging folder whose lock is free has lost its owner.
 void RemoveAbandoned(const fs::path& folder) {
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
     const bool staging = entry.path().filename().string().rfind(kStagingPrefix, 0) == 0;
-    if (!staging || !IsOld(entry.path())) continue;
+    if (!staging) continue;
     const int lock = TryLock(entry.path());
     if (lock < 0) continue;
     fs::remove_all(entry.path(), ignored);
@@ -113,6 +122,8 @@ absl::StatusOr<OutputDir> OutputDir::Create(const fs::path& folder) {
   fs::create_directories(out.folder_, error);
   if (error) return FileError("create", out.folder_, error.value());
 
+  // Nobody makes a staging folder meanwhile that is not locked yet.
+  const FolderLock lock(out.folder_);
   RemoveAbandoned(out.folder_);
   std::string pattern = (out.folder_ / absl::StrCat(kStagingPrefix, "XXXXXX")).string();
   if (::mkdtemp(pattern.data()) == nullptr) return FileError("create a folder in", out.folder_, errno);

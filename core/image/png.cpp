@@ -95,10 +95,8 @@ Image ImageOfRgba(const DecodeState& state) {
 
 }  // namespace
 
-absl::Status WritePng(const std::filesystem::path& path, int width, int height, std::span<const uint8_t> rgb) {
-  if (width <= 0 || height <= 0) {
-    return absl::InvalidArgumentError(absl::StrCat(path.string(), ": the image has no pixels"));
-  }
+absl::StatusOr<std::string> PngBytes(int width, int height, std::span<const uint8_t> rgb) {
+  if (width <= 0 || height <= 0) return absl::InvalidArgumentError("the image has no pixels");
   BAKEWELL_CHECK_OP(rgb.size(), ==, size_t{3} * static_cast<size_t>(width) * static_cast<size_t>(height));
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
@@ -109,9 +107,18 @@ absl::Status WritePng(const std::filesystem::path& path, int width, int height, 
   std::string bytes(size_bytes, '\0');
   const int as_is = 0;
   if (!png_image_write_to_memory(&image, bytes.data(), &size_bytes, as_is, rgb.data(), 3 * width, nullptr)) {
-    return absl::UnavailableError(absl::StrCat(path.string(), ": libpng cannot encode it: ", image.message));
+    return absl::UnavailableError(absl::StrCat("libpng cannot encode it: ", image.message));
   }
-  return WriteFileAtomically(path, std::string_view(bytes).substr(0, size_bytes));
+  bytes.resize(size_bytes);
+  return bytes;
+}
+
+absl::Status WritePng(const std::filesystem::path& path, int width, int height, std::span<const uint8_t> rgb) {
+  const auto bytes = PngBytes(width, height, rgb);
+  if (!bytes.ok()) {
+    return absl::Status(bytes.status().code(), absl::StrCat(path.string(), ": ", bytes.status().message()));
+  }
+  return WriteFileAtomically(path, *bytes);
 }
 
 absl::StatusOr<Image> ReadPng(const std::filesystem::path& path) {

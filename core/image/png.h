@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 
 #include "core/base/status.h"
 #include "core/image/image.h"
@@ -11,6 +12,9 @@ namespace bakewell {
 
 // Writes width x height RGB pixels, 8 bits a channel (rgb: 3 * width * height, row 0 on top). Whole or not at all.
 absl::Status WritePng(const std::filesystem::path& path, int width, int height, std::span<const uint8_t> rgb);
+
+// The same pixels as the bytes of a PNG file.
+absl::StatusOr<std::string> PngBytes(int width, int height, std::span<const uint8_t> rgb);
 
 // Reads any PNG as 8-bit RGBA channels scaled to [0,1], named R G B A. Safe on hostile files.
 absl::StatusOr<Image> ReadPng(const std::filesystem::path& path);

@@ -3,9 +3,11 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <google/protobuf/stubs/logging.h>
+#include <grpc/support/log.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 
@@ -38,7 +40,12 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> Credentials(const Conn
 
 }  // namespace
 
-void SilenceProtobuf() { google::protobuf::SetLogHandler(nullptr); }
+void SilenceLibraries() {
+  google::protobuf::SetLogHandler(nullptr);
+  if (std::getenv("GRPC_VERBOSITY") != nullptr) return;
+  constexpr int kAboveAll = GPR_LOG_SEVERITY_ERROR + 1;
+  gpr_set_log_verbosity(static_cast<gpr_log_severity>(kAboveAll));
+}
 
 bool IsLoopback(const std::string& address) {
   return absl::StartsWith(address, "localhost:") || absl::StartsWith(address, "127.") ||
@@ -49,6 +56,8 @@ absl::StatusOr<std::shared_ptr<Connection>> Connection::Open(const ConnectOption
   BAKEWELL_ASSIGN_OR_RETURN(const auto credentials, Credentials(options));
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
+  // Nobody packs: a message is held against that limit packed, whatever it unpacks to.
+  arguments.SetInt(GRPC_COMPRESSION_CHANNEL_ENABLED_ALGORITHMS_BITSET, 1 << GRPC_COMPRESS_NONE);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);

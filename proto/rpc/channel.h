@@ -45,8 +45,9 @@ class Connection {
 inline constexpr int kMaxMessageBytes = 4 << 20;
 inline constexpr size_t kChunkBytes = 512 << 10;
 
-// Keeps protobuf from printing what it refuses, for the whole process: hostile bytes would fill the log.
-void SilenceProtobuf();
+// Keeps protobuf and gRPC (unless GRPC_VERBOSITY is set) from printing what they refuse, for the whole process: hostile
+// bytes would fill the log.
+void SilenceLibraries();
 
 // Whether host:port names this machine only.
 bool IsLoopback(const std::string& address);

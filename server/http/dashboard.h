@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "server/job/coordinator.h"
+#include "server/preview/pictures.h"
 
 namespace httplib {
 class Server;
@@ -14,8 +15,8 @@ class Server;
 namespace bakewell::http {
 
 // GET /metrics (Prometheus text), /healthz (200 "ok", 503 and why not), / (the dashboard: one page without outside
-// assets), /status.json (what it shows) and /preview/JOB/NAME (a picture of a job, also while it runs). Read only, and
-// without tokens: listens on loopback unless the address says otherwise; put a proxy in front of it for more.
+// assets), /status.json (what it shows) and /preview/JOB/NAME (a picture of a job, also one that still fills in). Read
+// only, and without tokens: listens on loopback unless the address says otherwise; put a proxy in front of it for more.
 class Dashboard {
  public:
   // kUnavailable: the port cannot be had. kInvalidArgument: not HOST:PORT. Port 0: any.
@@ -25,7 +26,8 @@ class Dashboard {
   int port() const { return port_; }
 
  private:
-  explicit Dashboard(std::unique_ptr<httplib::Server> server);
+  Dashboard(std::unique_ptr<httplib::Server> server, job::Coordinator& coordinator);
+  preview::Pictures pictures_;
   std::unique_ptr<httplib::Server> server_;
   std::thread thread_;
   int port_ = 0;

@@ -1,7 +1,11 @@
 // What /metrics and /status.json say.
 #include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
+
+#include <algorithm>
 
 #include "core/artifact/json_line.h"
+#include "core/artifact/level_task.h"
 #include "server/http/dashboard.h"
 
 namespace bakewell::http {
@@ -20,9 +24,17 @@ JsonLine JsonOf(const job::JobView& view) {
   for (const job::PhaseView& phase : view.phases) {
     phases.push_back(JsonLine().Add("phase", phase.phase).Add("done", phase.done).Add("total", phase.total));
   }
-  std::vector<std::string> previews;
+  std::vector<JsonLine> pictures;
   for (const TaskOutput& artifact : view.artifacts) {
-    if (artifact.name.ends_with(".png")) previews.push_back(artifact.name);
+    if (artifact.name.ends_with(".png"))
+      pictures.push_back(JsonLine().Add("name", artifact.name).Add("parts", int64_t{-1}));
+  }
+  for (const job::PreviewView& preview : view.previews) {
+    // The finished page's picture takes its place.
+    const std::string page = absl::StrCat("lightmap-", absl::StripPrefix(preview.name, level_task::kPreviewPrefix));
+    const auto finished = [&](const TaskOutput& artifact) { return artifact.name == page; };
+    if (std::any_of(view.artifacts.begin(), view.artifacts.end(), finished)) continue;
+    pictures.push_back(JsonLine().Add("name", preview.name).Add("parts", preview.parts));
   }
   const bool running = view.row.state == store::JobState::kRunning;
   return JsonLine()
@@ -41,7 +53,7 @@ JsonLine JsonOf(const job::JobView& view) {
       .Add("left_low_us", int64_t{view.left_low.count()})
       .Add("left_high_us", int64_t{view.left_high.count()})
       .Add("phases", phases)
-      .Add("previews", previews);
+      .Add("pictures", pictures);
 }
 
 JsonLine JsonOf(const job::WorkerView& view) {

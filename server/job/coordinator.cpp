@@ -27,6 +27,13 @@ constexpr auto kTick = std::chrono::milliseconds(100);
 
 }  // namespace
 
+struct Coordinator::Parts {
+  std::unique_ptr<store::BlobStore> blobs;
+  std::unique_ptr<store::Tables> reader;
+  std::unique_ptr<store::Writer> writer;
+  int64_t epoch = 0;
+};
+
 absl::StatusOr<std::unique_ptr<Coordinator>> Coordinator::Open(Options options, const plan::Planner& planner) {
   FillDefaults(options);
   std::error_code error;
@@ -46,23 +53,23 @@ absl::StatusOr<std::unique_ptr<Coordinator>> Coordinator::Open(Options options, 
   };
   BAKEWELL_RETURN_IF_ERROR(writer->Run(start));
   std::unique_ptr<Coordinator> coordinator(
-      new Coordinator(std::move(options), planner, std::move(blobs), std::move(reader), std::move(writer), epoch));
+      new Coordinator(std::move(options), planner, {std::move(blobs), std::move(reader), std::move(writer), epoch}));
   BAKEWELL_RETURN_IF_ERROR(coordinator->Recover());
   coordinator->ticker_ = std::thread([raw = coordinator.get()] { raw->Tick(); });
   return coordinator;
 }
 
-Coordinator::Coordinator(Options options, const plan::Planner& planner, std::unique_ptr<store::BlobStore> blobs,
-                         std::unique_ptr<store::Tables> reader, std::unique_ptr<store::Writer> writer, int64_t epoch)
+Coordinator::Coordinator(Options options, const plan::Planner& planner, Parts parts)
     : options_(std::move(options)),
       planner_(planner),
       kinds_(planner.Kinds()),
-      blobs_(std::move(blobs)),
-      reader_(std::move(reader)),
-      sched_(options_.sched, sched::LeaseToken{static_cast<uint64_t>(epoch) << 32}),
+      blobs_(std::move(parts.blobs)),
+      reader_(std::move(parts.reader)),
+      sched_(options_.sched, sched::LeaseToken{static_cast<uint64_t>(parts.epoch) << 32}),
+      costs_(kinds_),
       // Worker ids carry the epoch as well, so that one from before a restart is never taken for another.
-      next_worker_((static_cast<uint64_t>(epoch) << 32) + 1),
-      writer_(std::move(writer)),
+      next_worker_((static_cast<uint64_t>(parts.epoch) << 32) + 1),
+      writer_(std::move(parts.writer)),
       io_(options_.io_threads) {}
 
 Coordinator::~Coordinator() {
@@ -95,6 +102,8 @@ absl::Status Coordinator::Recover() {
   std::vector<store::JobRow> running;
   {
     const std::lock_guard lock(reader_mutex_);
+    BAKEWELL_RETURN_IF_ERROR(
+        costs_.Load(*reader_, [this](int kind, double ratio) { sched_.SetSpeedRatio(kind, ratio); }));
     BAKEWELL_ASSIGN_OR_RETURN(next_job_, reader_->LastJobId());
     ++next_job_;
     BAKEWELL_ASSIGN_OR_RETURN(running,

@@ -5,22 +5,20 @@
 #include <memory>
 #include <shared_mutex>
 
+#include "server/job/learnt_costs.h"
 #include "server/job/options.h"
 #include "server/job/state.h"
 #include "server/job/types.h"
 #include "server/job/watch_list.h"
-#include "server/plan/plan.h"
 #include "server/sched/scheduler.h"
 #include "server/store/blobs.h"
 #include "server/store/collect.h"
 #include "server/store/io_pool.h"
-#include "server/store/writer.h"
 
 namespace bakewell::job {
 
-// The farm's memory and will: jobs from submit to artifacts. It joins the planner (what is to be done), the scheduler
-// (who does it when) and the store (what is safe). Thread safe. After a crash, Open() on the same folder goes on where
-// the last acknowledged change was.
+// The farm's memory and will: it joins the planner (what is to be done), the scheduler (who does it when) and the store
+// (what is safe). Thread safe. After a crash, Open() on the same folder goes on where the last acknowledged change was.
 //
 // One mutex guards the state machine; it is never held across disk or network. Whatever is acknowledged was committed:
 // replies come from the writer's thread after the commit.
@@ -41,6 +39,8 @@ class Coordinator {
   absl::StatusOr<store::CollectReport> CollectGarbage(int64_t target_bytes, int64_t grace_us);
   // kNotFound, or kDataLoss if the bytes were lost: submit again.
   absl::StatusOr<TaskOutput> FindArtifact(int64_t id, std::string_view name);
+  // SerializePreview() blobs of a running job's picture, from the `first` on. kNotFound.
+  absl::StatusOr<std::vector<Digest>> PreviewParts(int64_t id, std::string_view picture, size_t first);
 
   WatchList& watches() { return watches_; }  // notified at most ten times a second, and when a job ends
   // The bits of the kinds and versions that this farm plans.
@@ -51,7 +51,7 @@ class Coordinator {
   std::vector<TaskLease> Adopt(sched::WorkerId worker, const std::vector<TaskKey>& held);
   // False from these: the worker is not known, it must register.
   bool Heartbeat(sched::WorkerId worker);
-  // Names the connection, 0 if the worker is not known. A newer connection takes an older one's place.
+  // Names the connection, 0: worker not known. A newer connection takes an older one's place.
   uint64_t Connect(sched::WorkerId worker, LeaseSink sink);
   // The connection's sink is not called any more when this returns.
   void Disconnect(sched::WorkerId worker, uint64_t connection);
@@ -71,7 +71,6 @@ class Coordinator {
   void RecordBlob(const Digest& digest, int64_t size_bytes, Done done);
   absl::StatusOr<std::optional<store::TokenRow>> FindToken(const Digest& hash);
   absl::StatusOr<int64_t> CountTokens();
-
   Stats GetStats();
   const Options& options() const { return options_; }
   int64_t WallNowUs() const { return options_.wall_now_us(); }
@@ -79,8 +78,8 @@ class Coordinator {
  private:
   using TaskId = sched::TaskId;
   using Lock = std::unique_lock<std::mutex>;
-  Coordinator(Options options, const plan::Planner& planner, std::unique_ptr<store::BlobStore> blobs,
-              std::unique_ptr<store::Tables> reader, std::unique_ptr<store::Writer> writer, int64_t epoch);
+  struct Parts;
+  Coordinator(Options options, const plan::Planner& planner, Parts parts);
   sched::Time Now() const { return options_.steady_now(); }
 
   absl::Status CheckRequest(const SubmitRequest& request);
@@ -130,6 +129,7 @@ class Coordinator {
 
   mutable std::mutex mutex_;  // guards all that follows
   sched::Scheduler sched_;
+  LearntCosts costs_;
   std::vector<Task> tasks_;  // by TaskId
   absl::flat_hash_map<TaskKey, TaskId, TaskKeyHash> by_key_;
   std::map<int64_t, Job> jobs_;  // running

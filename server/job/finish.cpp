@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "core/artifact/level_task.h"
 #include "server/job/coordinator.h"
 
 namespace bakewell::job {
@@ -60,12 +61,31 @@ TaskOutputs Coordinator::ArtifactsOf(const Job& job) const {
   return artifacts;
 }
 
+void AddPreviews(const TaskOutputs& outputs, Job& job) {
+  for (const TaskOutput& output : outputs) {
+    if (output.name.starts_with(level_task::kPreviewPrefix)) job.previews[output.name].push_back(output.digest);
+  }
+}
+
+absl::StatusOr<std::vector<Digest>> Coordinator::PreviewParts(int64_t id, std::string_view picture, size_t first) {
+  const Lock lock(mutex_);
+  const auto job = jobs_.find(id);
+  if (job == jobs_.end()) return absl::NotFoundError(absl::StrCat("job ", id, " does not run"));
+  const auto parts = job->second.previews.find(picture);
+  if (parts == job->second.previews.end()) {
+    return absl::NotFoundError(absl::StrCat("job ", id, " has no picture '", std::string(picture), "' (yet)"));
+  }
+  const std::vector<Digest>& all = parts->second;
+  return std::vector<Digest>(all.begin() + static_cast<ptrdiff_t>(std::min(first, all.size())), all.end());
+}
+
 JobView Coordinator::ViewOf(const Job& job) const {
   JobView view;
   view.row = job.row;
   view.tasks_done = job.tasks_done;
   view.artifacts = ArtifactsOf(job);
   view.phases = PhasesOf(job);
+  for (const auto& [name, parts] : job.previews) view.previews.push_back({name + ".png", std::ssize(parts)});
   std::chrono::microseconds left{0};
   for (const auto& [phase, progress] : job.phases) {
     const auto kind = std::find_if(kinds_.begin(), kinds_.end(), [&](const plan::Kind& k) { return k.kind == phase; });

@@ -31,8 +31,11 @@ struct Job {
   std::map<std::string, Phase> phases;
   int64_t tasks_done = 0;
   absl::Status last_failure;  // of a task of its
+  // Blobs of pictures that fill in, in the order in which they came; a task that was done twice is there twice.
+  std::map<std::string, std::vector<Digest>, std::less<>> previews;
   bool changed = true, ending = false;
 };
+void AddPreviews(const TaskOutputs& outputs, Job& job);
 struct Worker {
   WorkerDescription about;
   LeaseSink sink;

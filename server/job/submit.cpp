@@ -194,8 +194,8 @@ absl::StatusOr<Estimate> Coordinator::EstimateCost(const SubmitRequest& request)
         ++estimate.tasks_known;
         continue;
       }
-      const auto kind = std::find(kinds_.begin(), kinds_.end(), plan::Kind{task.spec.kind, task.spec.code_version});
-      run += Scaled(task.cost, sched_.SpeedRatio(static_cast<int>(kind - kinds_.begin())));
+      const int kind = costs_.KindOf(task.spec);
+      run += Scaled(task.cost, kind < 0 ? 1 : costs_.RunRatio(kind));
     }
   }
   estimate.run_low = Scaled(run, kLowFactor);
@@ -246,15 +246,15 @@ Coordinator::TaskId Coordinator::AddTask(Job& job, const plan::PlannedTask& plan
     }
     task.jobs.push_back(job.row.id);
     sched_.JoinTask(sched_job, found->second);
+    if (task.done) AddPreviews(task.outputs, job);
     if (task.done)
       ++phase.done, ++job.tasks_done, ++job.row.known_tasks;
     else
       phase.left += task.cost;
     return found->second;
   }
-  const auto kind = std::find(kinds_.begin(), kinds_.end(), plan::Kind{planned.spec.kind, planned.spec.code_version});
   // A graph from before an upgrade may have a version that nobody runs now: its task waits for a worker that has it.
-  const int capability = kind == kinds_.end() ? 63 : static_cast<int>(kind - kinds_.begin());
+  const int kind = costs_.KindOf(planned.spec), capability = kind < 0 ? 63 : kind;
   sched::TaskInfo info{capability, next_order_++, planned.cost, planned.memory_bytes, {}, known.has_value()};
   for (const TaskInput& input : planned.spec.inputs) {
     const OutputOf* made = std::get_if<OutputOf>(&input.source);
@@ -267,6 +267,7 @@ Coordinator::TaskId Coordinator::AddTask(Job& job, const plan::PlannedTask& plan
   TaskOf(id) = Task{planned.key,       planned.spec, known.value_or(TaskOutputs{}), planned.memory_bytes, planned.cost,
                     known.has_value(), {job.row.id}};
   by_key_[planned.key] = id;
+  if (known) AddPreviews(*known, job);
   if (known)
     ++phase.done, ++job.tasks_done, ++job.row.known_tasks, ++stats_.known;
   else

@@ -23,11 +23,18 @@ struct PhaseView {
 std::string SerializePhases(const std::vector<PhaseView>& phases);
 absl::StatusOr<std::vector<PhaseView>> ParsePhases(std::string_view bytes);
 
+// A picture of a page that is not finished (server/preview).
+struct PreviewView {
+  std::string name;   // with ".png"
+  int64_t parts = 0;  // how many tasks' results it has
+};
+
 struct JobView {
   store::JobRow row;
   int64_t tasks_done = 0;
   std::vector<PhaseView> phases;
-  TaskOutputs artifacts;  // those that exist by now
+  TaskOutputs artifacts;              // those that exist by now
+  std::vector<PreviewView> previews;  // while it runs
   // Time left, an interval; negative: not known yet.
   std::chrono::microseconds left_low{-1}, left_high{-1};
 };

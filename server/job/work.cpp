@@ -198,6 +198,7 @@ void Coordinator::CountDone(Task& task) {
     ++phase.done;
     phase.left -= task.cost;
     phase.ended = Now();
+    AddPreviews(task.outputs, job);
     ++job.tasks_done;
     job.changed = true;
     const auto& last = job.stages.back();
@@ -239,6 +240,10 @@ void Coordinator::Complete(const CompletedTask& completed, Done done) {
   sched_.Complete(found->second, completed.token, Now());
   ++stats_.completed;
   stats_.run_us += completed.run.count();
+  if (const int kind = costs_.KindOf(task.spec); kind >= 0 && completed.run.count() > 0) {
+    const double ratio = static_cast<double>(completed.run.count()) / static_cast<double>(task.cost.count());
+    costs_.Learn(kind, ratio, sched_.SpeedRatio(kind), *writer_);
+  }
   if (const auto worker = workers_.find(completed.worker); worker != workers_.end()) ++worker->second.done;
   for (const int64_t id : task.jobs) {
     Job& job = jobs_.at(id);

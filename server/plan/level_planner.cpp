@@ -227,9 +227,13 @@ absl::StatusOr<TaskGraph> LevelPlanner::Plan(const PlanRequest& request, const B
   if (!scene.ok()) {
     return absl::InvalidArgumentError(absl::StrCat("the scene is malformed: ", scene.status().message()));
   }
-  BAKEWELL_RETURN_IF_ERROR(CheckTexels(*scene, context.settings, limits_.max_texels));
   double triangles = 0;
   for (const Object& object : scene->objects) triangles += static_cast<double>(object.index.size()) / 3;
+  if (triangles > limits_.max_triangles) {
+    return absl::ResourceExhaustedError(absl::StrFormat(
+        "the scene has %.3g triangles; %.3g are allowed: split the level", triangles, limits_.max_triangles));
+  }
+  BAKEWELL_RETURN_IF_ERROR(CheckTexels(*scene, context.settings, limits_.max_texels));
   TaskGraph graph;
   context.chart = Add(graph, MakeTask(context, level_task::kChart, 0, 0, 50 * triangles));
   PlannedTask survey = MakeTask(context, level_task::kSurvey, 0, 0, 20 * triangles);

@@ -8,6 +8,7 @@ namespace bakewell::plan {
 struct LevelLimits {
   std::chrono::microseconds task = std::chrono::seconds(2);  // work of one task; for workers that give it one thread
   double max_texels = 1 << 27;                               // more are refused: small scenes can ask for any number
+  double max_triangles = 1 << 26;                            // likewise: 12 bytes each, of one vertex
 };
 
 // Plans bakes (core/artifact/level_task.h): chart and survey first; what the survey counted decides the photon batches

@@ -4,7 +4,6 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/rpc/blob_service.h"
-#include "server/rpc/blob_stream.h"
 #include "server/rpc/watch_stream.h"
 
 namespace bakewell::rpc {
@@ -79,6 +78,11 @@ v1::Job MessageOf(const job::JobView& view) {
     artifact.set_digest(DigestToBytes(output.digest));
     artifact.set_size_bytes(output.size_bytes);
   }
+  for (const job::PreviewView& preview : view.previews) {
+    v1::Preview& picture = *message.add_previews();
+    picture.set_name(preview.name);
+    picture.set_parts(preview.parts);
+  }
   return message;
 }
 
@@ -150,6 +154,12 @@ grpc::ServerUnaryReactor* BakeService::Cancel(grpc::CallbackServerContext* conte
   });
 }
 
+absl::StatusOr<BlobRange> BakeService::PreviewRange(const v1::FetchRequest& request) {
+  BAKEWELL_ASSIGN_OR_RETURN(std::string png, pictures_.Png(request.job_id(), request.name()));
+  if (png.size() > kChunkBytes) return absl::ResourceExhaustedError("the picture is too large");
+  return BlobRange{{}, request.offset(), std::move(png)};
+}
+
 grpc::ServerWriteReactor<v1::FetchChunk>* BakeService::Fetch(grpc::CallbackServerContext* context,
                                                              const v1::FetchRequest* request) {
   using Refused = RefusedStream<v1::FetchChunk>;
@@ -159,10 +169,13 @@ grpc::ServerWriteReactor<v1::FetchChunk>* BakeService::Fetch(grpc::CallbackServe
   if (!slot->granted())
     return new Refused(services_, *context, absl::ResourceExhaustedError("too many transfers at a time: try again"));
   const auto choose = [this, request, who = *caller]() -> absl::StatusOr<BlobRange> {
-    BAKEWELL_RETURN_IF_ERROR(Find(who, request->job_id()).status());
+    BAKEWELL_ASSIGN_OR_RETURN(const job::JobView view, Find(who, request->job_id()));
+    for (const job::PreviewView& preview : view.previews) {
+      if (preview.name == request->name()) return PreviewRange(*request);
+    }
     BAKEWELL_ASSIGN_OR_RETURN(const bakewell::TaskOutput artifact,
                               services_.coordinator.FindArtifact(request->job_id(), request->name()));
-    return BlobRange{artifact.digest, request->offset()};
+    return BlobRange{artifact.digest, request->offset(), {}};
   };
   return new BlobStream<v1::FetchChunk>(services_, *context, choose, [slot]() mutable { slot.reset(); });
 }

@@ -3,6 +3,8 @@
 #include <atomic>
 
 #include "proto/bakewell/v1/bake.grpc.pb.h"
+#include "server/preview/pictures.h"
+#include "server/rpc/blob_stream.h"
 #include "server/rpc/call.h"
 
 namespace bakewell::rpc {
@@ -34,7 +36,10 @@ class BakeService final : public v1::BakeService::CallbackService {
   // The job, if the caller may see it; kNotFound otherwise, so that ids of others tell nothing.
   absl::StatusOr<job::JobView> Find(const Caller& caller, int64_t id);
 
+  absl::StatusOr<BlobRange> PreviewRange(const v1::FetchRequest& request);
+
   Services& services_;
+  preview::Pictures pictures_{services_.coordinator};
   std::atomic<int> transfers_{0};
   std::atomic<int> watches_{0};
 };

@@ -122,7 +122,7 @@ grpc::ServerWriteReactor<v1::DownloadChunk>* BlobService::Download(grpc::Callbac
     return new Refused(services_, *context, absl::ResourceExhaustedError("too many transfers at a time: try again"));
   const auto choose = [request]() -> absl::StatusOr<BlobRange> {
     BAKEWELL_ASSIGN_OR_RETURN(const Digest digest, DigestFromBytes(request->digest()));
-    return BlobRange{digest, request->offset()};
+    return BlobRange{digest, request->offset(), {}};
   };
   return new BlobStream<v1::DownloadChunk>(services_, *context, choose, [slot]() mutable { slot.reset(); });
 }

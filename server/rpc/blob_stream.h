@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "proto/rpc/channel.h"
@@ -17,6 +18,7 @@ namespace bakewell::rpc {
 struct BlobRange {
   Digest digest;
   int64_t offset = 0;
+  std::optional<std::string> made;  // at most kChunkBytes: sent instead of a blob of the store
 };
 using BlobChooser = std::function<absl::StatusOr<BlobRange>()>;
 
@@ -47,15 +49,24 @@ class BlobStream final : public grpc::ServerWriteReactor<Chunk> {
 
  private:
   void Start() {
-    const absl::Status status = Open();
-    if (status.ok())
-      Next();
-    else
+    const absl::StatusOr<BlobRange> range = choose_();
+    const absl::Status status = range.ok() ? Open(*range) : range.status();
+    if (!status.ok())
       this->Finish(services_.Answer(peer_, status));
+    else if (range->made)
+      this->StartWriteAndFinish(&chunk_, grpc::WriteOptions(), grpc::Status());
+    else
+      Next();
   }
 
-  absl::Status Open() {
-    BAKEWELL_ASSIGN_OR_RETURN(const BlobRange range, choose_());
+  absl::Status Open(const BlobRange& range) {
+    if (range.made) {
+      const auto size = std::ssize(*range.made);
+      if (range.offset < 0 || range.offset > size) return absl::OutOfRangeError("offset is beyond the picture");
+      chunk_.set_size_bytes(size);
+      chunk_.set_data(range.made->substr(static_cast<size_t>(range.offset)));
+      return absl::OkStatus();
+    }
     BAKEWELL_ASSIGN_OR_RETURN(download_, coordinator_.blobs().StartDownload(range.digest));
     BAKEWELL_RETURN_IF_ERROR(download_->Skip(range.offset));
     left_ = download_->size_bytes() - range.offset;

@@ -58,6 +58,10 @@ void SetLimits(const ServerOptions& options, grpc::ServerBuilder& builder) {
   quota.Resize(static_cast<size_t>(options.memory_bytes));
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(kMaxMessageBytes);
+  // gRPC holds a message against the limit before it unpacks it: 4 MiB can become 4 GiB. Nobody here packs.
+  for (const auto algorithm : {GRPC_COMPRESS_GZIP, GRPC_COMPRESS_DEFLATE}) {
+    builder.SetCompressionAlgorithmSupportStatus(algorithm, false);
+  }
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 256);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 16 << 10);
   // Half-open connections are found; a client may ping every five seconds, not more often.
@@ -90,7 +94,7 @@ FarmServer::FarmServer(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) 
 
 absl::StatusOr<std::unique_ptr<FarmServer>> FarmServer::Start(job::Coordinator& coordinator,
                                                               const ServerOptions& options) {
-  SilenceProtobuf();
+  SilenceLibraries();
   BAKEWELL_RETURN_IF_ERROR(CheckExposure(coordinator, options));
   BAKEWELL_ASSIGN_OR_RETURN(const auto credentials, Credentials(options));
   auto parts = std::make_unique<Parts>(coordinator, options);

@@ -207,9 +207,9 @@ Completion Scheduler::Complete(TaskId id, LeaseToken token, Time now) {
     // Learn how long this kind takes, and charge the user what it took.
     const Time took = std::max(Time(1), now - lease->second.start);
     const int capability = classes_[task.class_index].capability;
-    if (speed_ratio_.size() <= static_cast<size_t>(capability)) speed_ratio_.resize(capability + 1, 1.0);
     const double ratio = static_cast<double>(took.count()) / static_cast<double>(task.cost.count());
-    speed_ratio_[capability] += 0.1 * (std::min(ratio, 100.0) - speed_ratio_[capability]);
+    const double before = SpeedRatio(capability);
+    SetSpeedRatio(capability, before + 0.1 * (std::min(ratio, 100.0) - before));
     if (jobs_.contains(lease->second.charged_to)) ready_.Charge(lease->second.charged_to, took - lease->second.charged);
     by = lease->second.worker;
     workers_.at(by).failures_in_a_row = 0;

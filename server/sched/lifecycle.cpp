@@ -228,6 +228,11 @@ std::vector<TaskId> Scheduler::ForgetJob(JobId id) {
 
 void Scheduler::CancelJob(JobId job) { ForgetJob(job); }
 
+void Scheduler::SetSpeedRatio(int capability, double ratio) {
+  if (speed_ratio_.size() <= static_cast<size_t>(capability)) speed_ratio_.resize(capability + 1, 1.0);
+  speed_ratio_[capability] = ratio;
+}
+
 double Scheduler::SpeedRatio(int capability) const {
   return static_cast<size_t>(capability) < speed_ratio_.size() ? speed_ratio_[capability] : 1.0;
 }

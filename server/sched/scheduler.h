@@ -83,6 +83,8 @@ class Scheduler {
   LeaseToken last_token() const { return LeaseToken{next_token_ - 1}; }
   // Measured over estimated run time of a capability, 1 until something was measured.
   double SpeedRatio(int capability) const;
+  // What was measured before this scheduler's life.
+  void SetSpeedRatio(int capability, double ratio);
   // Aborts if the state contradicts itself; for tests. O(n).
   void CheckConsistent() const;
 

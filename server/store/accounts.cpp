@@ -1,4 +1,4 @@
-// Tables of people and of what went wrong: token, account, failure.
+// Tables of people, of what went wrong and of what was learnt: token, account, failure, cost.
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include "server/store/tables.h"
@@ -46,6 +46,27 @@ absl::StatusOr<int64_t> Tables::CountTokens() {
   BAKEWELL_RETURN_IF_ERROR(Query(
       "SELECT COUNT(*) FROM token", [](Row&) {}, [&](Row& row) { count = row.getColumn(0).getInt64(); }));
   return count;
+}
+
+absl::Status Tables::PutCost(const CostRow& cost) {
+  return Execute("INSERT OR REPLACE INTO cost VALUES(?,?,?,?,?)", [&](Row& row) {
+    row.bind(1, cost.kind);
+    row.bind(2, cost.code_version);
+    row.bind(3, cost.run_ratio);
+    row.bind(4, cost.lease_ratio);
+    row.bind(5, cost.samples);
+  });
+}
+
+absl::StatusOr<std::vector<CostRow>> Tables::Costs() {
+  std::vector<CostRow> costs;
+  BAKEWELL_RETURN_IF_ERROR(Query(
+      "SELECT kind,code_version,run_ratio,lease_ratio,samples FROM cost", [](Row&) {},
+      [&](Row& row) {
+        costs.push_back({row.getColumn(0).getString(), row.getColumn(1).getUInt(), row.getColumn(2).getDouble(),
+                         row.getColumn(3).getDouble(), row.getColumn(4).getInt64()});
+      }));
+  return costs;
 }
 
 absl::Status Tables::PutAccount(const AccountRow& account) {

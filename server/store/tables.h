@@ -65,6 +65,13 @@ struct FailureRow {
   std::string worker, reason;
 };
 
+struct CostRow {
+  std::string kind;
+  uint32_t code_version = 0;
+  double run_ratio = 1, lease_ratio = 1;
+  int64_t samples = 0;
+};
+
 struct JobFilter {
   std::string user;               // empty: all
   std::optional<JobState> state;  // nothing: all
@@ -72,12 +79,10 @@ struct JobFilter {
   int limit = 100;
 };
 
-// One connection and its prepared statements. Not thread safe: the Writer owns the one that writes, readers have their
-// own. SQLite's errors come back as in Guarded().
+// A connection and its prepared statements. Not thread safe: the Writer owns the one that writes. Errors as Guarded().
 class Tables {
  public:
   explicit Tables(std::unique_ptr<SQLite::Database> database);
-  // On the connections of OpenDatabase() and OpenReadOnly().
   static absl::StatusOr<std::unique_ptr<Tables>> Open(const std::filesystem::path& path,
                                                       Durability durability = Durability::kSafe);
   static absl::StatusOr<std::unique_ptr<Tables>> OpenReadOnly(const std::filesystem::path& path);
@@ -88,10 +93,8 @@ class Tables {
   void Rollback();
   // Runs `work` inside the open transaction; if it fails its changes are undone, those of others stay.
   absl::Status Apart(const std::function<absl::Status()>& work);
-
   // Counts a start of the coordinator; the new value.
   absl::StatusOr<int64_t> NextEpoch();
-
   absl::StatusOr<int64_t> InsertJob(const JobRow& job);
   absl::Status UpdateJob(const JobRow& job);  // all but id, user, client_key
   absl::StatusOr<std::optional<JobRow>> FindJob(int64_t id);
@@ -127,7 +130,8 @@ class Tables {
   absl::StatusOr<int64_t> CountTokens();
   absl::Status PutAccount(const AccountRow& account);
   absl::StatusOr<std::optional<AccountRow>> FindAccount(const std::string& user);
-
+  absl::Status PutCost(const CostRow& cost);
+  absl::StatusOr<std::vector<CostRow>> Costs();
   absl::Status InsertFailure(const FailureRow& failure);
   absl::StatusOr<std::vector<FailureRow>> RecentFailures(int64_t job, int limit);  // job 0: of all
 

@@ -109,6 +109,56 @@ TEST_F(FarmTest, EstimateCountsWhatIsKnown) {
   EXPECT_EQ(after->run_us_high(), 0);
 }
 
+TEST_F(FarmTest, EstimateIsOfMeasuredCostsAlsoAfterARestartAndKeysAreNot) {
+  Farm farm(FastOptions(dir.path()));
+  scene.two_stages = false;
+  SyntheticScene other = scene;
+  other.seed = 99;
+  const auto guess = farm.Client()->Estimate(other.Text(), {});
+  ASSERT_TRUE(guess.ok()) << guess.status();
+  // Tasks take ten times what the planner thinks.
+  Farm::RunningWorker& worker = farm.AddWorker("w");
+  worker.executor.before = [this](const TaskSpec&) {
+    std::this_thread::sleep_for(std::chrono::microseconds(9 * scene.work_us));
+    return absl::OkStatus();
+  };
+  farm.Bake(scene);
+  const auto learnt = farm.Client()->Estimate(other.Text(), {});
+  EXPECT_GT(learnt->run_us_low(), 6 * guess->run_us_low());
+  EXPECT_LT(learnt->run_us_low(), 40 * guess->run_us_low()) << "not by what a loaded machine adds to a sleep";
+  farm.StopCoordinator();
+  farm.StartCoordinator();
+  const auto after = farm.Client()->Estimate(other.Text(), {});
+  EXPECT_GT(after->run_us_low(), 6 * guess->run_us_low());
+  // What was learnt changes no key: the same scene again runs nothing.
+  const int runs = worker.executor.runs;
+  const v1::Job again = farm.Bake(scene, "again");
+  EXPECT_EQ(again.tasks_known(), again.tasks_total());
+  EXPECT_EQ(worker.executor.runs, runs);
+}
+
+// Symptom: a coordinator that was killed while photons flew took a part of them for all, and so did every later job.
+TEST_F(FarmTest, WhatAStoppedTaskHandsInIsNoResult) {
+  scene.work_us = 400'000;
+  scene.width = 2;
+  scene.layers = 1;
+  Farm quiet(FastOptions(dir.path() / "quiet"));
+  quiet.AddWorker("w");
+  const std::string right = DigestsOf(quiet.Bake(scene));
+  Farm farm(FastOptions(dir.path() / "farm"));
+  Farm::RunningWorker& worker = farm.AddWorker("w");
+  worker.executor.careless = true;
+  const auto client = farm.Client();
+  const auto job = client->Submit(scene.Text(), {});
+  ASSERT_TRUE(job.ok()) << job.status();
+  ASSERT_TRUE(WaitFor([&] { return worker.executor.runs > 0; }));
+  ASSERT_TRUE(client->Cancel(job->job_id()).ok());
+  ASSERT_TRUE(WaitFor([&] { return client->Workers()->workers(0).leases() == 0; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // what it hands in would have come
+  worker.executor.careless = false;
+  EXPECT_EQ(DigestsOf(farm.Bake(scene, "again")), right);
+}
+
 TEST_F(FarmTest, FetchWritesTheArtifactsAndResumes) {
   Farm farm(FastOptions(dir.path() / "farm"));
   farm.AddWorker("w");

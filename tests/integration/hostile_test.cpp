@@ -1,6 +1,10 @@
 // A client that means harm: the service refuses, says so once, and goes on.
 #include <absl/strings/str_cat.h>
+#include <grpcpp/create_channel.h>
 #include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/security/server_credentials.h>
+#include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
 #include <gtest/gtest.h>
 
 #include <random>
@@ -16,6 +20,7 @@
 #include "server/plan/level_planner.h"
 #include "server/rpc/refusal_log.h"
 #include "tests/support/farm.h"
+#include "tests/support/peak_memory.h"
 #include "tests/support/temp_dir.h"
 
 namespace bakewell::test {
@@ -167,13 +172,14 @@ std::string Mutated(const std::string& valid, uint32_t seed) {
 // Sends one message of any bytes to any method, and reads until the call ends.
 class RawCaller {
  public:
-  explicit RawCaller(const std::shared_ptr<grpc::Channel>& channel) : stub_(channel) {}
+  explicit RawCaller(const std::shared_ptr<grpc::Channel>& channel, milliseconds patience = milliseconds(500))
+      : stub_(channel), patience_(patience) {}
 
   grpc::StatusCode Call(const std::string& method, const std::string& bytes) {
     grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + milliseconds(500));
+    context.set_deadline(std::chrono::system_clock::now() + patience_);
     const auto call = stub_.PrepareCall(&context, method, &queue_);
-    grpc::Slice slice(bytes);
+    const grpc::Slice slice(bytes.data(), bytes.size(), grpc::Slice::STATIC_SLICE);  // the call ends before they do
     const grpc::ByteBuffer message(&slice, 1);
     grpc::ByteBuffer answer;
     grpc::Status status;
@@ -199,6 +205,7 @@ class RawCaller {
     return queue_.Next(&tag, &ok) && ok;
   }
   grpc::GenericStub stub_;
+  const milliseconds patience_;
   grpc::CompletionQueue queue_;
 };
 
@@ -253,6 +260,51 @@ TEST_F(HostileTest, MessagesAboveTheLimitAreRefused) {
   }
   farm.AddWorker("w");
   EXPECT_EQ(farm.Bake(scene).state(), v1::DONE);
+}
+
+// Symptom: 1 MiB that unpacks to 1 GiB passed the limit of 4 MiB, which gRPC holds against the packed size.
+TEST_F(HostileTest, MessagesThatUnpackToGigabytesAreRefusedPacked) {
+  Farm farm(OptionsHere());
+  farm.AddWorker("w");
+  const v1::Job before = farm.Bake(scene, "before");
+  const std::string zeros(256 << 20, '\0');
+  for (const grpc_compression_algorithm packing : {GRPC_COMPRESS_GZIP, GRPC_COMPRESS_DEFLATE}) {
+    grpc::ChannelArguments arguments;
+    arguments.SetCompressionAlgorithm(packing);
+    arguments.SetMaxSendMessageSize(-1);
+    const auto channel = grpc::CreateCustomChannel(farm.address(), grpc::InsecureChannelCredentials(), arguments);
+    const PeakMemory memory;
+    const grpc::StatusCode code = RawCaller(channel, seconds(20)).Call("/bakewell.v1.BlobService/Upload", zeros);
+    EXPECT_TRUE(code == grpc::UNIMPLEMENTED || code == grpc::RESOURCE_EXHAUSTED) << code;
+    // The bomb's maker, in this process too, packs it; the service must not unpack it.
+    EXPECT_LT(memory.GrownMegabytes(), 128);
+  }
+  EXPECT_EQ(farm.Bake(scene, "after").state(), v1::DONE);
+}
+
+// A coordinator that packs 64 MiB into 64 KiB.
+class PackingCoordinator final : public v1::BakeService::Service {
+  grpc::Status Get(grpc::ServerContext* context, const v1::GetRequest*, v1::Job* job) override {
+    context->set_compression_algorithm(GRPC_COMPRESS_GZIP);
+    job->set_reason(std::string(64 << 20, 'x'));
+    return {};
+  }
+};
+
+TEST(HostileCoordinator, ItsPackedMessagesAreRefusedByTheClient) {
+  PackingCoordinator service;
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort("localhost:0", grpc::InsecureServerCredentials(), &port);
+  builder.SetMaxSendMessageSize(-1);
+  builder.RegisterService(&service);
+  const auto server = builder.BuildAndStart();
+  ConnectOptions options;
+  options.address = absl::StrCat("localhost:", port);
+  FarmClient client(Connection::Open(options).value(), milliseconds(500));
+  const auto job = client.Get(1);
+  EXPECT_FALSE(job.ok()) << job->reason().size();
+  server->Shutdown();
 }
 
 // Symptom: an upload that stopped in the middle held its place among the transfers until its client went away.
@@ -323,6 +375,30 @@ TEST_F(HostileTest, SmallSceneThatAsksForBillionsOfTexelsIsRefusedAtSubmit) {
   settings.resolution = 0;
   settings.texels_per_metre = 1000;
   EXPECT_EQ(plan().code(), absl::StatusCode::kResourceExhausted) << plan();
+}
+
+// One vertex and 67 million triangles of it, as an instance count of a thousand millions would give them: 12 bytes each
+// in the blob, hundreds in a worker.
+TEST_F(HostileTest, MoreTrianglesThanALevelMayHaveAreRefusedAtSubmit) {
+  Scene crowd;
+  crowd.materials.emplace_back();
+  Object& object = crowd.objects.emplace_back();
+  object.lightmapped = true;
+  object.position = object.normal = {{0, 1, 0}};
+  object.uv0 = {{0, 0}};
+  object.index.assign(3 * 1001, 0);
+  const std::vector<std::byte> bytes = SerializeScene(crowd);
+  const plan::BlobReader read = [&](const Digest&) -> absl::StatusOr<std::string> {
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
+  const std::string settings = ProtoFromSettings({}).SerializeAsString();
+  plan::LevelLimits limits;
+  EXPECT_EQ(limits.max_triangles, 1 << 26);
+  EXPECT_TRUE(plan::LevelPlanner(limits).Plan({{}, settings}, read).ok());
+  limits.max_triangles = 1000;
+  const absl::Status refused = plan::LevelPlanner(limits).Plan({{}, settings}, read).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted) << refused;
+  EXPECT_NE(refused.message().find("1e+03 triangles"), std::string::npos) << refused;
 }
 
 TEST_F(HostileTest, SceneWhoseCountsLieIsRefusedWithoutMemory) {

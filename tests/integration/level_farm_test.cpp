@@ -2,12 +2,18 @@
 #include <gtest/gtest.h>
 
 #include "client/gltf/level.h"
+#include "core/artifact/level_task.h"
+#include "core/base/fields.h"
+#include "core/image/png.h"
 #include "core/scene/canonical.h"
 #include "proto/bakewell/v1/settings.pb.h"
 #include "proto/settings.h"
+#include "server/level/chart_task.h"
 #include "server/plan/level_planner.h"
 #include "tests/support/farm.h"
 #include "tests/support/level_farm.h"
+#include "tests/support/temp_dir.h"
+#include "worker/level/executor.h"
 
 namespace bakewell::test {
 namespace {
@@ -32,6 +38,78 @@ TEST(LevelFarm, FilesAreTheSameForAnyNumberOfWorkers) {
   EXPECT_EQ(one.state(), v1::DONE) << one.reason();
   EXPECT_GE(one.artifacts_size(), 6);
   EXPECT_EQ(DigestsOf(one), DigestsOf(three));
+}
+
+// Watch says that a picture grows; Fetch gives it, and it does grow.
+TEST(LevelFarm, PagesCanBeLookedAtWhileTheyAreGathered) {
+  const auto level = LoadLevel(std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb");
+  ASSERT_TRUE(level.ok()) << level.status();
+  const std::vector<std::byte> bytes = SerializeScene(level->scene);
+  const std::string scene(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  BakeSettings settings;
+  settings.quality = Quality::kHigh;
+  settings.resolution = 96;
+  const LevelFarm farm(1);
+  FarmClient client(farm.Connect());
+  const TempDir dir;
+  const auto submitted = client.Submit(scene, {"", "", ProtoFromSettings(settings).SerializeAsString(), false});
+  ASSERT_TRUE(submitted.ok()) << submitted.status();
+  std::vector<int64_t> lit;  // pixels of the picture each time that it had grown
+  int64_t parts = 0;
+  const auto job = client.Watch(submitted->job_id(), [&](const v1::Job& now) {
+    if (now.state() != v1::RUNNING || now.previews_size() == 0 || now.previews(0).parts() == parts) return true;
+    const v1::Preview& preview = now.previews(0);
+    EXPECT_EQ(preview.name(), "preview-0.png");
+    EXPECT_GT(preview.parts(), parts);
+    const absl::Status fetched = client.FetchPreview(now.id(), preview, dir.path());
+    if (absl::IsNotFound(fetched)) return true;  // the job has ended meanwhile
+    EXPECT_TRUE(fetched.ok()) << fetched;
+    parts = preview.parts();
+    const auto picture = ReadPng(dir / "preview-0.png");
+    EXPECT_TRUE(picture.ok()) << picture.status();
+    if (!picture.ok()) return false;
+    EXPECT_LE(picture->width, 48);
+    lit.push_back(0);
+    for (size_t i = 0; i < picture->PixelCount(); ++i) lit.back() += picture->Channel(0)[i] > 0;
+    return true;
+  });
+  ASSERT_TRUE(job.ok()) << job.status();
+  EXPECT_EQ(job->state(), v1::DONE) << job->reason();
+  ASSERT_GE(lit.size(), 2u);
+  EXPECT_GT(lit.front(), 0);
+  EXPECT_GT(lit.back(), lit.front());
+  EXPECT_EQ(job->previews_size(), 0) << "it has its pages now";
+  v1::Preview gone;
+  gone.set_name("preview-0.png");
+  EXPECT_EQ(client.FetchPreview(job->id(), gone, dir.path()).code(), absl::StatusCode::kNotFound);
+  gone.set_name("../preview-0.png");
+  EXPECT_EQ(client.FetchPreview(job->id(), gone, dir.path()).code(), absl::StatusCode::kDataLoss);
+}
+
+TEST(LevelExecutor, StoppedPhotonsAreNoResult) {
+  const auto level = LoadLevel(std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb");
+  ASSERT_TRUE(level.ok()) << level.status();
+  const std::vector<std::byte> bytes = SerializeScene(level->scene);
+  const std::string scene(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  BakeSettings settings;
+  settings.quality = Quality::kPreview;
+  settings.resolution = 32;
+  const std::string task = level_task::Serialize({SettingsJson(settings), 0, 1});
+  const auto layout =
+      ChartTasks()[0].run({level_task::kChart.kind, level_task::kChart.code_version, task, {}}, {scene});
+  ASSERT_TRUE(layout.ok()) << layout.status();
+  TaskSpec spec{level_task::kEmit.kind, level_task::kEmit.code_version, task, {}};
+  TaskInputs inputs;
+  for (const auto& [name, blob] :
+       {std::pair<std::string, std::string>("scene", scene), {"layout", (*layout)[0].bytes}}) {
+    spec.inputs.push_back({name, Sha256Of(blob)});
+    inputs.emplace_back(name, std::make_shared<const std::string>(blob));
+  }
+  LevelExecutor executor;
+  EXPECT_TRUE(executor.Run(spec, inputs, {}).ok());
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_TRUE(absl::IsCancelled(executor.Run(spec, inputs, stop.get_token()).status()));
 }
 
 TEST(LevelFarm, HostileSettingsAndScenesAreRefusedAtSubmit) {

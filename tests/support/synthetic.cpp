@@ -152,6 +152,7 @@ absl::StatusOr<MadeOutputs> SyntheticExecutor::Run(const TaskSpec& spec, const T
   for (const auto& [name, blob] : inputs) seed.PutDigest(Sha256Of(*blob));
   const Digest digest = Spin(Sha256Of(seed.bytes()), hashes, stop);
   Sleep(work, stop);
+  if (stop.stop_requested() && careless) return MadeOutputs{{"out", "a part"}};
   if (stop.stop_requested()) return absl::CancelledError("stopped");
   MadeOutputs made = {{"out", Expand(digest, size_bytes)}};
   if (after) after(made);

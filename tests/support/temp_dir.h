@@ -4,11 +4,13 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
+#include <string_view>
 
 #include "core/base/check.h"
 
-namespace bakewell::test {
+namespace bakewell {
 
 // A folder of the test's own, removed with everything in it at the end.
 class TempDir {
@@ -24,10 +26,22 @@ class TempDir {
   }
   TempDir(const TempDir&) = delete;
   TempDir& operator=(const TempDir&) = delete;
+
   const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
 
  private:
   std::filesystem::path path_;
 };
 
-}  // namespace bakewell::test
+// Writes a file without syncing it, for tests that write thousands. ext4 syncs a file that is truncated and written
+// again, so an old one is removed first.
+inline void WriteQuickly(const std::filesystem::path& path, std::string_view bytes) {
+  std::filesystem::remove(path);
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  BAKEWELL_CHECK(file.good());
+}
+
+}  // namespace bakewell

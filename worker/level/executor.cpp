@@ -4,6 +4,9 @@
 #include <absl/strings/str_cat.h>
 #include <tbb/parallel_for.h>
 
+#include <map>
+
+#include "core/artifact/page_preview.h"
 #include "core/atlas/serialize.h"
 #include "core/scene/canonical.h"
 #include "proto/settings.h"
@@ -57,6 +60,25 @@ Digest KeyOfInputs(const TaskSpec& spec, std::initializer_list<absl::string_view
   }
   writer.PutString(more);
   return Sha256Of(writer.bytes());
+}
+
+// What the tiles [begin, end) look like: an output for each page that they lie on.
+MadeOutputs Previews(const TexelMap& map, int begin, std::span<const GatheredTiles> tiles) {
+  std::map<int, PreviewBuilder> pages;
+  for (size_t i = 0; i < tiles.size(); ++i) {
+    const Texel* texel = &map.texels[map.tile_begin[static_cast<size_t>(begin) + i]];
+    for (const TexelLight& light : tiles[i].lights) {
+      const PageSize size = map.pages[static_cast<size_t>(texel->page)];
+      PreviewBuilder& page = pages.try_emplace(texel->page, size.width, size.height).first->second;
+      if (light.valid) page.Add(texel->x, texel->y, light.irradiance);
+      ++texel;
+    }
+  }
+  MadeOutputs outputs;
+  for (auto& [page, builder] : pages) {
+    outputs.push_back({absl::StrCat(level_task::kPreviewPrefix, page), SerializePreview(builder.Take())});
+  }
+  return outputs;
 }
 
 // Level and photons do not depend on how well texels are to be gathered.
@@ -162,6 +184,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Emit(const Work& work) {
     EmitPhotons(*level->world, *level->lights, stage->guide, stage->cells, stage->plan, begin, end, progress, map);
     Say("photons", photons_done_ += end - begin, photons);
   });
+  if (work.stop.stop_requested()) return absl::CancelledError("stopped");  // not all photons flew
   return MadeOutputs{{"flux", SerializePhotons(map)}};
 }
 
@@ -215,7 +238,9 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
     Say("gather", ++tiles_done_, all);
   });
   if (work.stop.stop_requested()) return absl::CancelledError("stopped");
-  return MadeOutputs{{"lights", SerializeTiles(Joined(made))}};
+  MadeOutputs outputs = Previews(*texels, begin - first, made);
+  outputs.push_back({"lights", SerializeTiles(Joined(made))});
+  return outputs;
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {

@@ -94,6 +94,8 @@ void Worker::RunTask(const TaskPtr& task) {
       return absl::InternalError(error.what());
     }
   }();
+  // What a task hands in that was told to stop may be a part of its result.
+  if (task->stop.stop_requested()) made = absl::CancelledError("stopped");
   if (!made.ok()) return Report(task, made.status(), missing);
   {
     const std::lock_guard lock(mutex_);

@@ -32,8 +32,8 @@ struct TaskKind {
 
 // Runs tasks: a pure function of spec and inputs, the same bytes for any number of threads. Called from several threads
 // at a time, one per slot; may keep what it prepared for inputs that come again. `stop` asks it to return soon, with
-// any status. kInvalidArgument, kFailedPrecondition and kOutOfRange are the task's own fault and fail its job; any
-// other failure is tried elsewhere.
+// any status: what it hands in then is thrown away. kInvalidArgument, kFailedPrecondition and kOutOfRange are the
+// task's own fault and fail its job; any other failure is tried elsewhere.
 class TaskExecutor {
  public:
   virtual ~TaskExecutor() = default;

@@ -8,11 +8,11 @@ readonly flags=("$@")
 dir="$(mktemp -d)"
 readonly dir
 readonly port="${BAKEWELL_BENCH_PORT:-17731}"
-server=0
-workers=(0 0 0)
+server=""
+workers=()
 RANDOM=7
 
-stop_all() { kill -9 "$server" "${workers[@]}" 2>/dev/null || true; rm -rf "$dir"; }
+stop_all() { [[ -z "$server" ]] || kill -9 "$server" "${workers[@]}" 2>/dev/null || true; rm -rf "$dir"; }
 trap stop_all EXIT
 
 start_server() {

@@ -140,7 +140,7 @@ GltfBuilder FullGltf() {
 }
 
 absl::StatusOr<LoadedLevel> Load(const GltfBuilder& builder) {
-  const test::TempDir dir;
+  const TempDir dir;
   return LoadLevel(builder.Write(dir.path() / "full.glb"));
 }
 
@@ -186,7 +186,7 @@ TEST(GltfNumbers, BeyondWhatFloatsHoldAreRefusedByName) {
 
 TEST(GltfNumbers, ThatJsonDoesNotHaveAreRefused) {
   const std::string text = FullGltf().Gltf();
-  const test::TempDir dir;
+  const TempDir dir;
   for (const char* bad : {"NaN", "Infinity", "-Infinity", "1e999"}) {
     std::string changed = text;
     const std::string good = "\"alphaCutoff\":0.5";

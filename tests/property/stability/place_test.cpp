@@ -50,7 +50,7 @@ absl::StatusOr<LoadedLevel> LoadQuad(const nlohmann::json& node) {
   builder.json["nodes"][0].update(node);
   builder.json["scenes"][0]["extras"] = {{"environment", {{"type", "constant"}, {"radiance", {1, 1, 1}}}},
                                          {"lightmap", {{"width", 8}, {"height", 8}}}};
-  const test::TempDir dir;
+  const TempDir dir;
   return LoadLevel(builder.Write(dir.path() / "quad.glb"));
 }
 

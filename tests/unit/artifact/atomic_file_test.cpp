@@ -6,7 +6,7 @@
 #include <csignal>
 #include <thread>
 
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -17,11 +17,11 @@ size_t FileCount(const std::filesystem::path& folder) {
 }
 
 TEST(WriteFileAtomically, ReplacesAndLeavesNoTemporary) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WriteFileAtomically(folder / "a", "one").ok());
   ASSERT_TRUE(WriteFileAtomically(folder / "a", "two").ok());
   EXPECT_EQ(ReadWholeFile(folder / "a").value(), "two");
-  EXPECT_EQ(FileCount(folder.Path()), 1u);
+  EXPECT_EQ(FileCount(folder.path()), 1u);
 }
 
 TEST(WriteFileAtomically, MissingFolderIsUnavailableAndNamesPathAndReason) {
@@ -33,7 +33,7 @@ TEST(WriteFileAtomically, MissingFolderIsUnavailableAndNamesPathAndReason) {
 
 // EFBIG takes the way of ENOSPC and needs no full disk.
 TEST(WriteFileAtomically, FullDiskIsResourceExhaustedAndLeavesTheOldFile) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WriteFileAtomically(folder / "a", "old").ok());
   std::signal(SIGXFSZ, SIG_IGN);
   rlimit before{};
@@ -45,11 +45,11 @@ TEST(WriteFileAtomically, FullDiskIsResourceExhaustedAndLeavesTheOldFile) {
   setrlimit(RLIMIT_FSIZE, &before);
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
   EXPECT_EQ(ReadWholeFile(folder / "a").value(), "old");
-  EXPECT_EQ(FileCount(folder.Path()), 1u);
+  EXPECT_EQ(FileCount(folder.path()), 1u);
 }
 
 TEST(WriteFileAtomically, ConcurrentWritersLeaveOneOfTheirFilesWhole) {
-  const TempFolder folder;
+  const TempDir folder;
   const std::string one(100000, '1'), two(100000, '2');
   const auto write = [&](const std::string& text) {
     for (int i = 0; i < 20; ++i) ASSERT_TRUE(WriteFileAtomically(folder / "a", text).ok());
@@ -59,7 +59,7 @@ TEST(WriteFileAtomically, ConcurrentWritersLeaveOneOfTheirFilesWhole) {
   second.join();
   const std::string read = ReadWholeFile(folder / "a").value();
   EXPECT_TRUE(read == one || read == two);
-  EXPECT_EQ(FileCount(folder.Path()), 1u);
+  EXPECT_EQ(FileCount(folder.path()), 1u);
 }
 
 TEST(ReadWholeFile, MissingIsNotFoundAndAFolderIsInvalid) {

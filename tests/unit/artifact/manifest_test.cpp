@@ -7,7 +7,7 @@
 
 #include "core/artifact/atomic_file.h"
 #include "core/artifact/json_line.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::json;
 
 TEST(Manifest, SaysWhatItWasGiven) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WriteFileAtomically(folder / "abc", "abc").ok());
   Manifest manifest;
   manifest.version = "0.1.0";
@@ -26,7 +26,7 @@ TEST(Manifest, SaysWhatItWasGiven) {
   manifest.peak_memory_bytes = 4096;
   manifest.warnings = {"no normals"};
   manifest.files = {DescribeFile(folder / "abc", "irradiance").value()};
-  ASSERT_TRUE(WriteManifest(folder.Path(), manifest).ok());
+  ASSERT_TRUE(WriteManifest(folder.path(), manifest).ok());
 
   const Json json = Json::parse(ReadWholeFile(folder / "manifest.json").value());
   EXPECT_EQ(json["format"], 1);

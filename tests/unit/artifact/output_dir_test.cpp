@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
+#include <thread>
 
 #include "core/artifact/atomic_file.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -22,7 +24,7 @@ std::vector<std::string> Names(const fs::path& folder) {
 }
 
 TEST(OutputDir, FilesAppearAtCommitAndNothingElseStays) {
-  const TempFolder folder;
+  const TempDir folder;
   {
     absl::StatusOr<OutputDir> out = OutputDir::Create(folder / "a/b");
     ASSERT_TRUE(out.ok()) << out.status();
@@ -37,24 +39,24 @@ TEST(OutputDir, FilesAppearAtCommitAndNothingElseStays) {
 }
 
 TEST(OutputDir, WithoutCommitTheDiskIsAsBefore) {
-  const TempFolder folder;
+  const TempDir folder;
   {
     absl::StatusOr<OutputDir> out = OutputDir::Create(folder / "a/b/");
     ASSERT_TRUE(out.ok()) << out.status();
     ASSERT_TRUE(WriteFileAtomically(out->Staging() / "x.exr", "x").ok());
     const OutputDir moved = *std::move(out);  // the moved-from one must not clean up
   }
-  EXPECT_TRUE(Names(folder.Path()).empty());
+  EXPECT_TRUE(Names(folder.path()).empty());
 }
 
 TEST(OutputDir, AnEarlierBakeStaysUntilCommitAndIsReplacedByIt) {
-  const TempFolder folder;
+  const TempDir folder;
   for (const char* const name : {"x.exr", "manifest.json", "mine.txt"}) {
     ASSERT_TRUE(WriteFileAtomically(folder / name, "old").ok());
   }
-  { ASSERT_TRUE(OutputDir::Create(folder.Path()).ok()); }
-  EXPECT_EQ(Names(folder.Path()), (std::vector<std::string>{"manifest.json", "mine.txt", "x.exr"}));
-  absl::StatusOr<OutputDir> out = OutputDir::Create(folder.Path());
+  { ASSERT_TRUE(OutputDir::Create(folder.path()).ok()); }
+  EXPECT_EQ(Names(folder.path()), (std::vector<std::string>{"manifest.json", "mine.txt", "x.exr"}));
+  absl::StatusOr<OutputDir> out = OutputDir::Create(folder.path());
   ASSERT_TRUE(WriteFileAtomically(out->Staging() / "x.exr", "new").ok());
   ASSERT_TRUE(out->Commit().ok());
   EXPECT_EQ(ReadWholeFile(folder / "x.exr").value(), "new");
@@ -62,21 +64,38 @@ TEST(OutputDir, AnEarlierBakeStaysUntilCommitAndIsReplacedByIt) {
   EXPECT_FALSE(fs::exists(folder / "manifest.json")) << "it described the files that were replaced";
 }
 
+// Symptom: after a second Ctrl-C the next bake left the killed one's folder where it was, for it was not a minute old.
 TEST(OutputDir, StagingOfAKilledProcessIsRemovedThatOfALivingOneIsNot) {
-  const TempFolder folder;
-  const absl::StatusOr<OutputDir> living = OutputDir::Create(folder.Path());
+  const TempDir folder;
+  const absl::StatusOr<OutputDir> living = OutputDir::Create(folder.path());
   ASSERT_TRUE(living.ok());
-  fs::create_directory(folder / ".bakewell-killed");
-  for (const fs::path& path : {folder / ".bakewell-killed", living->Staging()}) {
-    fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::hours(1));
-  }
-  ASSERT_TRUE(OutputDir::Create(folder.Path()).ok());
+  fs::create_directories(folder / ".bakewell-killed" / "farm");
+  fs::last_write_time(living->Staging(), fs::file_time_type::clock::now() - std::chrono::hours(1));
+  ASSERT_TRUE(OutputDir::Create(folder.path()).ok());
   EXPECT_FALSE(fs::exists(folder / ".bakewell-killed"));
   EXPECT_TRUE(fs::exists(living->Staging()));
 }
 
+TEST(OutputDir, ManyBakesAtATimeDoNotTakeEachOthersStaging) {
+  const TempDir folder;
+  std::atomic<int> kept{0};
+  std::vector<std::thread> bakes;
+  for (int i = 0; i < 8; ++i) {
+    bakes.emplace_back([&] {
+      for (int round = 0; round < 50; ++round) {
+        const absl::StatusOr<OutputDir> out = OutputDir::Create(folder.path());
+        std::this_thread::yield();
+        kept += out.ok() && fs::exists(out->Staging());
+      }
+    });
+  }
+  for (std::thread& bake : bakes) bake.join();
+  EXPECT_EQ(kept, 8 * 50);
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
 TEST(OutputDir, AFileInTheWayIsTheUsersError) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WriteFileAtomically(folder / "out", "x").ok());
   EXPECT_EQ(OutputDir::Create(folder / "out").status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_FALSE(OutputDir::Create(folder / "out/deeper").ok());

@@ -9,7 +9,7 @@
 #include "core/artifact/atomic_file.h"
 #include "core/image/exr.h"
 #include "core/image/png.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -112,7 +112,7 @@ TEST(CliBake, EveryFlagReachesTheRequest) {
 }
 
 TEST(CliBake, FlagsOverrideTheSettingsFile) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WriteFileAtomically(folder / "s.json", R"({"quality":"HIGH","seed":3})").ok());
   const std::string file = folder / "s.json";
   const Outcome run = RunWith({"bake", "a.glb", "--settings", file.c_str(), "--seed", "4"});
@@ -123,7 +123,7 @@ TEST(CliBake, FlagsOverrideTheSettingsFile) {
 }
 
 TEST(CliBake, APictureInTheSettingsFileIsFoundBesideIt) {
-  const TempFolder folder;
+  const TempDir folder;
   Image sky(2, 1, {"R", "G", "B"});
   sky.data = {1, 2, 3, 4, 5, 6};
   ASSERT_TRUE(WriteExr(folder / "sky.exr", sky).ok());
@@ -238,7 +238,7 @@ TEST(Cli, HelpHasExamplesAndExitsWithZero) {
 
 // Two 2 x 2 images that differ in one covered texel.
 struct ComparedFiles {
-  TempFolder folder;
+  TempDir folder;
   std::string a = folder / "a.exr", b = folder / "b.exr", picture = folder / "d.png";
 
   ComparedFiles() {

@@ -24,6 +24,21 @@ TEST(ProgressEstimate, SteadyGatherGivesTheTimeLeftWithinTheLaterPhasesShare) {
   EXPECT_NEAR(estimate.TimeLeft(kStart + seconds(25))->count(), 75 + 100 * 0.05 / 0.95, 1e-9);
 }
 
+// Symptom: the bar stood still while --density signal baked its preview.
+TEST(ProgressEstimate, PreviewMovesTheBarAndLeavesRoomForTheRest) {
+  ProgressEstimate estimate;
+  estimate.Report("texels", 1, 1, kStart);
+  const double before = estimate.Fraction();
+  estimate.Report("preview", 0, 10, kStart);
+  estimate.Report("preview", 5, 10, kStart + seconds(5));
+  EXPECT_GT(estimate.Fraction(), before);
+  const auto left = estimate.TimeLeft(kStart + seconds(5));
+  ASSERT_TRUE(left.has_value());
+  EXPECT_GT(left->count(), 5) << "the bake itself comes after it";
+  estimate.Report("write", 1, 1, kStart + seconds(60));
+  EXPECT_NEAR(estimate.Fraction(), 1, 1e-12);
+}
+
 TEST(ProgressEstimate, SaysNothingBeforeThereIsEvidence) {
   ProgressEstimate estimate;
   estimate.Report("gather", 0, 1000, kStart);

@@ -9,7 +9,7 @@
 
 #include "client/gltf/level.h"
 #include "tests/support/gltf_builder.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -35,7 +35,7 @@ GltfBuilder RichGltf() {
   return builder;
 }
 
-absl::Status LoadBytes(const std::string& bytes, const TempFolder& folder, const char* name = "hostile.glb") {
+absl::Status LoadBytes(const std::string& bytes, const TempDir& folder, const char* name = "hostile.glb") {
   std::ofstream(folder / name, std::ios::binary) << bytes;
   return LoadLevel(folder / name).status();
 }
@@ -49,13 +49,13 @@ uint64_t Random(uint64_t key) {
 }
 
 TEST(HostileLevel, RichFileIsFineBeforeItIsBroken) {
-  const TempFolder folder;
+  const TempDir folder;
   EXPECT_TRUE(LoadBytes(RichGltf().Glb(), folder).ok());
   EXPECT_TRUE(LoadBytes(RichGltf().Gltf(), folder, "hostile.gltf").ok());
 }
 
 TEST(HostileLevel, EveryPrefixIsRefused) {
-  const TempFolder folder;
+  const TempDir folder;
   const std::string glb = RichGltf().Glb();
   for (size_t size = 0; size < glb.size(); ++size) {
     const absl::Status status = LoadBytes(glb.substr(0, size), folder);
@@ -65,7 +65,7 @@ TEST(HostileLevel, EveryPrefixIsRefused) {
 }
 
 TEST(HostileLevel, ByteFlipsNeverCrash) {
-  const TempFolder folder;
+  const TempDir folder;
   const std::string glb = RichGltf().Glb();
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   int tried = 0;
@@ -334,7 +334,7 @@ const Attack kAttacks[] = {
 };
 
 TEST(HostileLevel, EachAttackGivesOneErrorThatNamesFileAndObject) {
-  const TempFolder folder;
+  const TempDir folder;
   for (const Attack& attack : kAttacks) {
     GltfBuilder builder = QuadGltf();
     attack.apply(builder);
@@ -346,7 +346,7 @@ TEST(HostileLevel, EachAttackGivesOneErrorThatNamesFileAndObject) {
 }
 
 TEST(HostileLevel, MissingFilesAreNotFound) {
-  const TempFolder folder;
+  const TempDir folder;
   const absl::Status level = LoadLevel(folder / "nothing.glb").status();
   EXPECT_EQ(level.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(level.message()), HasSubstr("nothing.glb"));
@@ -358,7 +358,7 @@ TEST(HostileLevel, MissingFilesAreNotFound) {
 }
 
 TEST(HostileLevel, LinksOutOfTheFolderAreNotFollowed) {
-  const TempFolder folder, elsewhere;
+  const TempDir folder, elsewhere;
   std::ofstream(elsewhere / "secret.png") << "secret";
   std::filesystem::create_symlink(elsewhere / "secret.png", folder / "link.png");
   GltfBuilder builder = QuadGltf();
@@ -367,7 +367,7 @@ TEST(HostileLevel, LinksOutOfTheFolderAreNotFollowed) {
 }
 
 TEST(HostileLevel, DeepNestingCostsNoStack) {
-  const TempFolder folder;
+  const TempDir folder;
   const std::string deep(1000000, '[');
   EXPECT_THAT(std::string(LoadBytes(deep, folder, "deep.gltf").message()), HasSubstr("nested deeper than"));
   // A chain of nodes is no nesting of JSON, and is fine.
@@ -378,7 +378,7 @@ TEST(HostileLevel, DeepNestingCostsNoStack) {
 }
 
 TEST(HostileLevel, GlbHeaderIsChecked) {
-  const TempFolder folder;
+  const TempDir folder;
   std::string glb = QuadGltf().Glb();
   glb[4] = 1;
   EXPECT_THAT(std::string(LoadBytes(glb, folder).message()), HasSubstr("version 1 is not 2"));

@@ -6,7 +6,7 @@
 #include "client/gltf/level.h"
 #include "core/scene/canonical.h"
 #include "tests/support/gltf_builder.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -18,7 +18,7 @@ using testing::HasSubstr;
 constexpr float kHalf = 0.5f;
 
 LoadedLevel MustLoad(const GltfBuilder& builder, const char* name = "level.glb") {
-  const TempFolder folder;
+  const TempDir folder;
   auto level = LoadLevel(builder.Write(folder / name));
   EXPECT_TRUE(level.ok()) << level.status();
   return level.ok() ? *std::move(level) : LoadedLevel{};

@@ -9,7 +9,7 @@
 
 #include "client/gltf/level.h"
 #include "tests/support/gltf_builder.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -74,7 +74,7 @@ struct Written {
 };
 
 Written WriteAndReload(const GltfBuilder& builder, int pages, const char* name = "in.glb") {
-  const TempFolder folder;
+  const TempDir folder;
   const auto path = builder.Write(folder / name);
   auto before = LoadLevel(path);
   EXPECT_TRUE(before.ok()) << before.status();
@@ -185,7 +185,7 @@ TEST(WriteLevel, WhatItDoesNotKnowItKeeps) {
 }
 
 TEST(WriteLevel, ExternalFilesAreEmbedded) {
-  const TempFolder folder;
+  const TempDir folder;
   GltfBuilder builder = BigQuad();
   builder.json["images"] = {{{"uri", "a%20b.png"}}};
   builder.json["textures"] = {{{"source", 0}}};
@@ -219,7 +219,7 @@ TEST(WriteLevel, SceneWithoutChartsIsStillWritten) {
 }
 
 TEST(WriteLevel, ChangedInputIsNoticed) {
-  const TempFolder folder;
+  const TempDir folder;
   const auto path = BigQuad().Write(folder / "in.glb");
   const auto level = LoadLevel(path);
   ASSERT_TRUE(level.ok());

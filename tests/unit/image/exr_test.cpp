@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "core/artifact/atomic_file.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -31,7 +31,7 @@ void ExpectSameBits(const std::vector<float>& a, const std::vector<float>& b) {
 }
 
 TEST(Exr, TwentySevenNamedChannelsComeBackBitForBit) {
-  const TempFolder folder;
+  const TempDir folder;
   const Image written = Ramp(33, 21, ShNames());
   ASSERT_TRUE(WriteExr(folder / "a.exr", written).ok());
   const absl::StatusOr<Image> read = ReadExr(folder / "a.exr");
@@ -43,7 +43,7 @@ TEST(Exr, TwentySevenNamedChannelsComeBackBitForBit) {
 }
 
 TEST(Exr, ChannelsAreReadInAlphabeticalOrder) {
-  const TempFolder folder;
+  const TempDir folder;
   Image written(1, 1, {"R", "G", "B", "A"});
   written.data = {1, 2, 3, 4};
   ASSERT_TRUE(WriteExr(folder / "a.exr", written).ok());
@@ -55,7 +55,7 @@ TEST(Exr, ChannelsAreReadInAlphabeticalOrder) {
 
 TEST(Exr, NanInfinityZeroSignAndDenormalsSurvive) {
   using Limits = std::numeric_limits<float>;
-  const TempFolder folder;
+  const TempDir folder;
   Image written(8, 1, {"Y"});
   written.data = {Limits::quiet_NaN(),
                   Limits::infinity(),
@@ -72,7 +72,7 @@ TEST(Exr, NanInfinityZeroSignAndDenormalsSurvive) {
 }
 
 TEST(Exr, SameImageGivesSameBytes) {
-  const TempFolder folder;
+  const TempDir folder;
   const Image image = Ramp(70, 40, ShNames());
   ASSERT_TRUE(WriteExr(folder / "a.exr", image).ok());
   ASSERT_TRUE(WriteExr(folder / "b.exr", image).ok());
@@ -80,7 +80,7 @@ TEST(Exr, SameImageGivesSameBytes) {
 }
 
 TEST(Exr, EveryTruncationIsAnErrorThatNamesTheFile) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WriteExr(folder / "a.exr", Ramp(20, 40, {"R", "G", "B"})).ok());
   const std::string bytes = ReadWholeFile(folder / "a.exr").value();
   for (size_t size = 0; size < bytes.size(); ++size) {
@@ -92,7 +92,7 @@ TEST(Exr, EveryTruncationIsAnErrorThatNamesTheFile) {
 }
 
 TEST(Exr, AFlippedByteIsAnErrorOrAnImageNeverACrash) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WriteExr(folder / "a.exr", Ramp(20, 40, {"R", "G", "B"})).ok());
   const std::string bytes = ReadWholeFile(folder / "a.exr").value();
   for (size_t i = 0; i < bytes.size(); ++i) {
@@ -109,7 +109,7 @@ TEST(Exr, MissingFileIsNotFound) {
 }
 
 TEST(Exr, ImagesThatTheFormatCannotHoldAreRefused) {
-  const TempFolder folder;
+  const TempDir folder;
   EXPECT_EQ(WriteExr(folder / "a.exr", Image()).code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(WriteExr(folder / "a.exr", Image(2, 2, {})).code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(WriteExr(folder / "a.exr", Image(2, 2, {"R", "R"})).code(), absl::StatusCode::kInvalidArgument);

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/artifact/atomic_file.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/temp_dir.h"
 
 namespace bakewell {
 namespace {
@@ -15,7 +15,7 @@ std::vector<uint8_t> Ramp(int width, int height) {
 }
 
 TEST(Png, EveryByteComesBack) {
-  const TempFolder folder;
+  const TempDir folder;
   const std::vector<uint8_t> rgb = Ramp(19, 11);
   ASSERT_TRUE(WritePng(folder / "a.png", 19, 11, rgb).ok());
   const absl::StatusOr<Image> read = ReadPng(folder / "a.png");
@@ -30,7 +30,7 @@ TEST(Png, EveryByteComesBack) {
 }
 
 TEST(Png, SamePixelsGiveSameBytes) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WritePng(folder / "a.png", 19, 11, Ramp(19, 11)).ok());
   ASSERT_TRUE(WritePng(folder / "b.png", 19, 11, Ramp(19, 11)).ok());
   EXPECT_EQ(ReadWholeFile(folder / "a.png").value(), ReadWholeFile(folder / "b.png").value());
@@ -44,7 +44,7 @@ TEST(Png, GreyOfTwoBitsIsScaledAndNotGammaCorrected) {
       0x04, 0x67, 0x41, 0x4d, 0x41, 0x00, 0x01, 0x86, 0xa0, 0x31, 0xe8, 0x96, 0x5f, 0x00, 0x00, 0x00, 0x0d, 0x49,
       0x44, 0x41, 0x54, 0x78, 0x01, 0x01, 0x02, 0x00, 0xfd, 0xff, 0x00, 0x1b, 0x00, 0x1d, 0x00, 0x1c, 0x1d, 0x49,
       0x23, 0xd5, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WriteFileAtomically(folder / "a.png", std::as_bytes(std::span(bytes))).ok());
   const absl::StatusOr<Image> read = ReadPng(folder / "a.png");
   ASSERT_TRUE(read.ok()) << read.status();
@@ -52,7 +52,7 @@ TEST(Png, GreyOfTwoBitsIsScaledAndNotGammaCorrected) {
 }
 
 TEST(Png, EveryTruncationIsAnErrorThatNamesTheFile) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WritePng(folder / "a.png", 19, 11, Ramp(19, 11)).ok());
   const std::string bytes = ReadWholeFile(folder / "a.png").value();
   for (size_t size = 0; size < bytes.size(); ++size) {
@@ -64,7 +64,7 @@ TEST(Png, EveryTruncationIsAnErrorThatNamesTheFile) {
 }
 
 TEST(Png, AFlippedByteIsAnErrorOrAnImageNeverACrash) {
-  const TempFolder folder;
+  const TempDir folder;
   ASSERT_TRUE(WritePng(folder / "a.png", 19, 11, Ramp(19, 11)).ok());
   const std::string bytes = ReadWholeFile(folder / "a.png").value();
   for (size_t i = 0; i < bytes.size(); ++i) {

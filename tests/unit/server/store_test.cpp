@@ -43,7 +43,7 @@ class StoreTest : public testing::Test {
   static TaskKey Key(const std::string& name) { return TaskKey{Sha256Of(name)}; }
   fs::path FileOf(const Digest& digest) { return dir.path() / "blobs" / digest.Hex().substr(0, 2) / digest.Hex(); }
 
-  test::TempDir dir;
+  TempDir dir;
   std::unique_ptr<Writer> writer;
   std::unique_ptr<BlobStore> blobs;
 };
