@@ -26,7 +26,7 @@ struct KindName {
 };
 inline constexpr KindName kChart{"chart/layout", 2};
 inline constexpr KindName kSurvey{"texel/survey", 3};
-inline constexpr KindName kEmit{"photon/emit", 3};
+inline constexpr KindName kEmit{"photon/emit", 4};
 inline constexpr KindName kDensity{"photon/density", 3};
 inline constexpr KindName kGather{"gather/tiles", 5};
 inline constexpr KindName kFinish{"finish/page", 4};

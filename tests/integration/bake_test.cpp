@@ -73,7 +73,7 @@ void ExpectTheBytesOfTheBareKernels(const BakeSettings& settings) {
   ASSERT_TRUE(prepared.ok()) << prepared.status();
   auto baked = BakeTexels(*prepared, settings, clock, progress);
   ASSERT_TRUE(baked.ok()) << baked.status();
-  const GatherOptions asked = BudgetOf(settings, prepared->texels).gather;
+  const GatherOptions asked = BudgetOf(settings, std::ssize(prepared->texels.texels)).gather;
   BakeTally tally;
   tally.Count(baked->counters);
   for (int page = 0; page < static_cast<int>(prepared->texels.pages.size()); ++page) {

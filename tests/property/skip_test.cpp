@@ -97,7 +97,7 @@ struct Fooled {
     SilentProgress progress;
     EmitPhotons(*prepared.world, *prepared.lights, guide, cells, plan, 0, plan.photons, progress, map);
     cache = EstimateDensity(*prepared.world, cells, map, plan, {}, progress);
-    options = BudgetOf({}, prepared.texels).gather;
+    options = BudgetOf({}, std::ssize(prepared.texels.texels)).gather;
     options.mean_irradiance = MeanIrradiance(prepared.texels, cells, cache);
     options.photon_flux = 1e-9f * MeanPhotonFlux(cells, cache);
   }

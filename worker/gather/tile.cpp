@@ -5,7 +5,7 @@
 #include <limits>
 #include <optional>
 
-#include "worker/filter/window.h"
+#include "worker/filter/smooth_tile.h"
 #include "worker/gather/direct.h"
 #include "worker/gather/guide.h"
 #include "worker/gather/noise.h"
@@ -318,73 +318,22 @@ class TileGatherer {
     return count > 0 ? sum / static_cast<float>(count) : 0;
   }
 
-  // The tile and as much around it as a filter's window reaches. What lies outside has no values yet, only places.
+  // Which of its neighbours each texel is connected to, on the grid and for the page's filter.
   void Connect() {
-    const Texel& first = map_.texels[begin_];
-    constexpr int kMargin = SmoothGrid::kMostRadius;
-    left_ = first.x / kTileSide * kTileSide - kMargin;
-    top_ = first.y / kTileSide * kTileSide - kMargin;
-    const PageSize page = map_.pages[first.page];
-    for (int y = 0; y < grid_.height(); ++y) {
-      for (int x = 0; x < grid_.width(); ++x) {
-        if (left_ + x < 0 || top_ + y < 0 || left_ + x >= page.width || top_ + y >= page.height) continue;
-        const int32_t texel = TexelAt(left_ + x, top_ + y);
-        if (texel >= 0) ConnectCell(x, y, static_cast<uint32_t>(texel));
-      }
-    }
-  }
-
-  void ConnectCell(int x, int y, uint32_t texel) {
-    const bool mine = texel >= begin_ && texel < end_;
-    if (mine && !work_[texel - begin_].valid) return;
-    if (mine) work_[texel - begin_].open = ConnectTexel(scene_.world, map_, texel, counters_.filter_rays);
-    const PageSize page = map_.pages[map_.texels[texel].page];
-    for (int k = 0; k < 4; ++k) {
-      const int nx = left_ + x + kNeighbours[k][0], ny = top_ + y + kNeighbours[k][1];
-      if (nx < 0 || ny < 0 || nx >= page.width || ny >= page.height) continue;
-      const int32_t other = TexelAt(nx, ny);
-      if (other < 0 || map_.texels[other].chart != map_.texels[texel].chart) continue;
-      const bool other_mine = static_cast<uint32_t>(other) >= begin_ && static_cast<uint32_t>(other) < end_;
-      if (other_mine && !work_[static_cast<uint32_t>(other) - begin_].valid) continue;
-      if (!mine || (work_[texel - begin_].open >> k & 1)) grid_.Connect(x, y, k);
-    }
-  }
-
-  int32_t TexelAt(int x, int y) const {
-    const Texel& first = map_.texels[begin_];
-    const size_t width = static_cast<size_t>(map_.pages[first.page].width);
-    return map_.texel_at[first.page][static_cast<size_t>(y) * width + static_cast<size_t>(x)];
-  }
-
-  SmoothCell& CellOf(size_t i) {
-    const Texel& texel = map_.texels[begin_ + i];
-    return grid_.At(texel.x - left_, texel.y - top_);
+    std::vector<bool> valid;
+    for (const Work& work : work_) valid.push_back(work.valid);
+    const std::vector<uint8_t> open =
+        smooth_.emplace(map_, begin_, end_).Connect(scene_.world, valid, counters_.filter_rays);
+    for (size_t i = 0; i < work_.size(); ++i) work_[i].open = open[i];
   }
 
   // Every texel's indirect luminance and its variance after filtering, as far as this tile can tell.
   std::vector<SmoothGrid::Smoothed> SmoothIndirect() {
-    std::vector<SmoothGrid::Smoothed> result(work_.size());
     for (size_t i = 0; i < work_.size(); ++i) {
-      if (!work_[i].valid) continue;
-      SmoothCell& cell = CellOf(i);
-      cell.known = true;
-      cell.value = Luminance(work_[i].indirect.Irradiance());
-      cell.variance = Luminance(work_[i].IndirectVariance());
+      const Work& work = work_[i];
+      if (work.valid) smooth_->Put(i, Luminance(work.indirect.Irradiance()), Luminance(work.IndirectVariance()));
     }
-    ForEachCell([&](size_t i, int x, int y) { result[i].variance = grid_.NoiseVariance(x, y); });
-    ForEachCell([&](size_t i, int, int) { CellOf(i).variance = result[i].variance; });
-    std::vector<SmoothGrid::Steps> steps(work_.size());
-    ForEachCell([&](size_t i, int x, int y) { CellOf(i).radius = grid_.Choose(x, y, &steps[i]); });
-    ForEachCell([&](size_t i, int x, int y) { result[i] = grid_.SmoothedAt(x, y, grid_.Agree(x, y), steps[i]); });
-    return result;
-  }
-
-  template <typename Visit>
-  void ForEachCell(Visit visit) {
-    for (size_t i = 0; i < work_.size(); ++i) {
-      const Texel& texel = map_.texels[begin_ + i];
-      if (work_[i].valid) visit(i, texel.x - left_, texel.y - top_);
-    }
+    return smooth_->Smooth();
   }
 
   // How far the sets that took part in the last round are better than their blocks say.
@@ -467,8 +416,7 @@ class TileGatherer {
   const bool lit_ = !scene_.tree.empty() || scene_.lights.environment().bright() || scene_.lights.samples_distant();
   int64_t escaped_ = 0;  // gather rays
   Distant distant_ = Distant::kSampled;
-  SmoothGrid grid_{kTileSide + 2 * SmoothGrid::kMostRadius, kTileSide + 2 * SmoothGrid::kMostRadius};
-  int left_ = 0, top_ = 0;  // of the grid, on the page
+  std::optional<SmoothTile> smooth_;
   std::vector<Work> work_;
 };
 
