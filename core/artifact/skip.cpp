@@ -35,8 +35,6 @@ void SkipTally::Add(const SkipTally& other) {
   audited += other.audited;
   failed_over += other.failed_over;
   found_ppm = std::max(found_ppm, other.found_ppm);
-  largest_ppm = std::max(largest_ppm, other.largest_ppm);
-  square_ppm2 += other.square_ppm2;
 }
 
 std::string Serialize(const SkipTally& tally) {
@@ -44,8 +42,7 @@ std::string Serialize(const SkipTally& tally) {
   for (const SkipCount& count : tally.kind) {
     for (const int64_t value : {count.skipped, count.of, count.saved}) writer.Put(static_cast<uint64_t>(value));
   }
-  for (const int64_t value :
-       {tally.audited, tally.failed_over, tally.found_ppm, tally.largest_ppm, tally.square_ppm2}) {
+  for (const int64_t value : {tally.audited, tally.failed_over, tally.found_ppm}) {
     writer.Put(static_cast<uint64_t>(value));
   }
   return std::move(writer).bytes();
@@ -58,8 +55,7 @@ absl::StatusOr<SkipTally> ParseSkipTally(std::string_view bytes) {
     for (int64_t* value : {&count.skipped, &count.of, &count.saved})
       *value = static_cast<int64_t>(reader.Get<uint64_t>());
   }
-  for (int64_t* value :
-       {&tally.audited, &tally.failed_over, &tally.found_ppm, &tally.largest_ppm, &tally.square_ppm2}) {
+  for (int64_t* value : {&tally.audited, &tally.failed_over, &tally.found_ppm}) {
     *value = static_cast<int64_t>(reader.Get<uint64_t>());
   }
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("skip tally"));

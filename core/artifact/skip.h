@@ -56,9 +56,9 @@ struct SkipCount {
 struct SkipTally {
   std::array<SkipCount, kSkipNames.size()> kind;
   int64_t audited = 0, failed_over = 0;  // texels; tiles that were computed again without skipping
-  // Luminance that skipping would have lost in the audited texels over the mean of the bake, in parts per million; and
-  // without the tiles that failed over, the largest and the sum of squares.
-  int64_t found_ppm = 0, largest_ppm = 0, square_ppm2 = 0;
+  // The largest luminance that skipping would have lost in an audited texel, over the mean of the bake, in parts per
+  // million.
+  int64_t found_ppm = 0;
 
   SkipCount& operator[](Skip skip) { return kind[static_cast<size_t>(skip)]; }
   void Add(const SkipTally& other);

@@ -52,21 +52,22 @@ GatherGuide::Sample GatherGuide::Draw(Vec2f u) const {
 }
 
 void FoundLight::Add(Vec3f place, bool at_infinity, float luminance) {
-  count_ += 1;
-  mean_ += static_cast<double>(luminance);
-  square_ += static_cast<double>(luminance) * static_cast<double>(luminance);
   if (luminance > 0) rays_.push_back({place, at_infinity, luminance});
 }
 
-void FoundLight::Resample(float u) {
-  mean_ /= std::max(count_, 1.0);
-  square_ /= std::max(count_, 1.0);
-  if (!(square_ > 0)) return;
-  const double step = square_ * count_ / static_cast<double>(kKept);
-  double sum = 0, next = step * static_cast<double>(u);
+void FoundLight::Resample(double rays, float u) {
+  double sum = 0, square = 0;
   for (const Ray& ray : rays_) {
-    sum += static_cast<double>(ray.luminance) * static_cast<double>(ray.luminance);
-    for (; next < sum; next += step) kept_.push_back(ray);
+    sum += static_cast<double>(ray.luminance);
+    square += static_cast<double>(ray.luminance) * static_cast<double>(ray.luminance);
+  }
+  if (!(square > 0)) return;
+  mean_share_ = sum * sum / (rays * square);
+  const double step = square / static_cast<double>(kKept);
+  double passed = 0, next = step * static_cast<double>(u);
+  for (const Ray& ray : rays_) {
+    passed += static_cast<double>(ray.luminance) * static_cast<double>(ray.luminance);
+    for (; next < passed; next += step) kept_.push_back(ray);
   }
   rays_ = {};
 }
@@ -102,9 +103,9 @@ std::optional<GatherGuide> FoundLight::GuideAt(Vec3f position, const Frame& fram
       mean += root / static_cast<float>(kCells);
     }
   }
-  // Second moments, over that of unguided rays.
-  const double still = mean_ * mean_ / square_, guided = static_cast<double>(mean) * static_cast<double>(mean);
-  if (1 - still < kLeastGain * std::max(guided - still, 0.0)) return std::nullopt;
+  // Variances, over the second moment of unguided rays.
+  const double guided = static_cast<double>(mean) * static_cast<double>(mean) - mean_share_;
+  if (1 - mean_share_ < kLeastGain * std::max(guided, 0.0)) return std::nullopt;
   for (float& w : weight) w = (1 - kGuided) * mean + kGuided * w;
   return GatherGuide(weight);
 }

@@ -34,11 +34,12 @@ class GatherGuide {
 class FoundLight {
  public:
   // A ray whose primary sample was uniform brought `luminance` (of its share of the irradiance [W m^-2]) from the point
-  // `place`, or from the direction `place` at infinity; 0 counts as well.
+  // `place`, or from the direction `place` at infinity.
   void Add(Vec3f place, bool at_infinity, float luminance);
 
-  // Keeps some of the rays, each as often as the square of its light says. `u` in [0, 1) decides which.
-  void Resample(float u);
+  // Keeps some of the rays, each as often as the square of its light says. `rays`: how many there were with those that
+  // brought nothing; `u` in [0, 1) decides which are kept.
+  void Resample(double rays, float u);
 
   // The guide of a texel at `position`: to the root mean square of the light in each part of the hemisphere about
   // `frame`, which leaves the least variance, and in part uniform, so that no direction is lost. Nothing where it
@@ -52,7 +53,7 @@ class FoundLight {
     float luminance;
   };
   std::vector<Ray> rays_, kept_;
-  double count_ = 0, mean_ = 0, square_ = 0;  // of the luminance; sums until Resample
+  double mean_share_ = 0;  // square of the rays' mean luminance, over their mean square
 };
 
 }  // namespace bakewell

@@ -66,6 +66,17 @@ float MeanPhotonFlux(const SurfaceCells& cells, const RadianceCache& cache) {
   return cache.photons_seen > 0 ? static_cast<float>(flux / static_cast<double>(cache.photons_seen)) : 0;
 }
 
+float DimmestIrradiance(const SurfaceCells& cells, const RadianceCache& cache, const TexelMap& map, uint32_t begin,
+                        uint32_t end) {
+  float dimmest = std::numeric_limits<float>::infinity();
+  for (uint32_t i = begin; i < end; ++i) {
+    const uint32_t triangle = map.fragments[map.texels[i].fragment_begin].triangle;
+    const size_t cell = cells.CellAt(triangle, map.texels[i].position);
+    dimmest = std::min(dimmest, Luminance(cache.irradiance[2 * cell].direct + cache.irradiance[2 * cell].indirect));
+  }
+  return dimmest;
+}
+
 std::vector<bool> DrawAudit(std::span<const uint32_t> keys, const std::vector<bool>& leaves_out) {
   std::vector<std::pair<uint32_t, size_t>> lots;
   for (size_t i = 0; i < keys.size(); ++i) {
@@ -78,26 +89,19 @@ std::vector<bool> DrawAudit(std::span<const uint32_t> keys, const std::vector<bo
   return audited;
 }
 
-void SkipAudit::Found(float lost, float tolerated, float mean, int64_t rays) {
+void SkipAudit::Found(float lost, float mean, int64_t rays) {
   ++texels_;
   rays_ += rays;
   if (!(lost > 0)) return;
-  if (!(lost <= tolerated)) passes_ = false;
-  constexpr float kMost = 1;  // so that the squares of a million texels can be added up
-  const int64_t ppm = std::llround(1e6 * static_cast<double>(lost < kMost * mean ? lost / mean : kMost));
-  largest_ppm_ = std::max(largest_ppm_, ppm);
-  square_ppm2_ += ppm * ppm;
+  passes_ = false;
+  constexpr float kMost = 1e6f;  // means; no mean is no reason for more
+  found_ppm_ = std::max(found_ppm_, std::llround(1e6 * static_cast<double>(lost < kMost * mean ? lost / mean : kMost)));
 }
 
 void SkipAudit::Count(SkipTally& tally) const {
   tally.audited += texels_;
-  tally.found_ppm = std::max(tally.found_ppm, largest_ppm_);
-  if (!passes_) {
-    ++tally.failed_over;
-    return;
-  }
-  tally.largest_ppm = std::max(tally.largest_ppm, largest_ppm_);
-  tally.square_ppm2 += square_ppm2_;
+  tally.failed_over += passes_ ? 0 : 1;
+  tally.found_ppm = std::max<int64_t>(tally.found_ppm, found_ppm_);
 }
 
 }  // namespace bakewell

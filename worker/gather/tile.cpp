@@ -19,7 +19,7 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kCulledShare = 0.1f;  // of what is tolerated in the dark
+constexpr float kCulledShare = 0.1f;  // of the target error of the tile's dimmest texel
 constexpr uint32_t kAuditSamples = 64;
 constexpr int64_t kWorthLeavingOut = 64;  // texels; fewer cost less than the audit
 
@@ -104,7 +104,10 @@ class TileGatherer {
   void ChooseLights(const Texel& texel, float radius, Work& work) {
     if (!lights_) {
       const uint32_t tile_key = TexelKey(map_.texels[begin_], options_.seed ^ 0x711eu);
-      const float dispensable = Skips(Skip::kCulledLights) ? kCulledShare * Tolerated(0) : -1;
+      const float dispensable =
+          Skips(Skip::kCulledLights)
+              ? kCulledShare * options_.target_error * DimmestIrradiance(scene_.cells, scene_.cache, map_, begin_, end_)
+              : -1;
       lights_.emplace(scene_, map_, begin_, end_, tile_key, dispensable, counters_);
     }
     work.choice = lights_->ForTexel(texel, radius);
@@ -159,7 +162,7 @@ class TileGatherer {
       if (work.direct_active) DirectRound(work, 0, samples);
       rays[i] += counters_.light_rays();
       const float found = Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance());
-      if (work.audited && work.valid) audit.Found(found, Tolerated(found), options_.mean_irradiance, rays[i]);
+      if (work.audited && work.valid) audit.Found(found, options_.mean_irradiance, rays[i]);
     }
     audit.Count(counters_.skip);
     if (audit.passes()) CountDark(audit);
@@ -190,7 +193,7 @@ class TileGatherer {
       GatherDirect(scene_, work_[i].sampler, *lights_, {}, Distant::kSampled, HashCombine(work_[i].key, 0x5c1u), 0,
                    kAuditSamples, lost, counters_);
       const float found = Luminance(lost.Irradiance());
-      audit.Found(found, Tolerated(found), options_.mean_irradiance, 0);
+      audit.Found(found, options_.mean_irradiance, 0);
     }
     audit.Count(counters_.skip);
     if (!audit.passes()) return;
@@ -200,7 +203,11 @@ class TileGatherer {
 
   // The first round's rays guide the others.
   void Guide() {
-    found_->Resample(UnitFloat(HashCombine(TexelKey(map_.texels[begin_], options_.seed), 0x9d1deu)));
+    // Texels that no light reaches have no say.
+    float rays = 0;
+    for (const Work& work : work_) rays += Luminance(work.indirect.Irradiance()) > 0 ? work.indirect.count() : 0;
+    found_->Resample(static_cast<double>(rays),
+                     UnitFloat(HashCombine(TexelKey(map_.texels[begin_], options_.seed), 0x9d1deu)));
     for (Work& work : work_) {
       if (!work.indirect_active) continue;
       const TexelPoint point = work.sampler.At({0.5f, 0.5f});

@@ -99,12 +99,9 @@ void CountSkips(const SkipTally& tally, const SkipSet& no_skip, std::map<std::st
     counters[name + "of"] = tally.kind[i].of;
     counters[name + "saved"] = tally.kind[i].saved;
   }
-  const double square = static_cast<double>(tally.square_ppm2) / std::max(1.0, static_cast<double>(tally.audited));
   counters["skip/audit/texels"] = tally.audited;
   counters["skip/audit/failed_over"] = tally.failed_over;
   counters["skip/audit/found_ppm"] = tally.found_ppm;
-  counters["skip/audit/largest_ppm"] = tally.largest_ppm;
-  counters["skip/audit/rms_ppm"] = std::llround(std::sqrt(square));
 }
 
 }  // namespace

@@ -20,8 +20,7 @@ TEST(SkipTally, BytesBringItBackAndSumsDoNotDependOnTheOrder) {
   SkipTally a, b;
   a[Skip::kNoLight] = {1, 2, 3};
   a.audited = 5;
-  a.largest_ppm = 10;
-  a.square_ppm2 = 70;
+  a.found_ppm = 10;
   b[Skip::kUnfacedBacks] = {7, 8, 9};
   b.failed_over = 2;
   b.found_ppm = 30;
