@@ -48,7 +48,7 @@ TEST(LevelFarm, PagesCanBeLookedAtWhileTheyAreGathered) {
   const std::string scene(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   BakeSettings settings;
   settings.quality = Quality::kHigh;
-  settings.resolution = 256;
+  settings.resolution = 160;
   const LevelFarm farm(1);
   FarmClient client(farm.Connect());
   const TempDir dir;
@@ -68,7 +68,7 @@ TEST(LevelFarm, PagesCanBeLookedAtWhileTheyAreGathered) {
     const auto picture = ReadPng(dir / "preview-0.png");
     EXPECT_TRUE(picture.ok()) << picture.status();
     if (!picture.ok()) return false;
-    EXPECT_LE(picture->width, 128);
+    EXPECT_LE(picture->width, 80);
     lit.push_back(0);
     for (size_t i = 0; i < picture->PixelCount(); ++i) lit.back() += picture->Channel(0)[i] > 0;
     return true;
