@@ -10,10 +10,11 @@ namespace bakewell {
 namespace {
 
 constexpr int kRows = GatherGuide::kRows, kColumns = GatherGuide::kColumns, kCells = GatherGuide::kCells;
-constexpr size_t kKept = 512;        // rays
-constexpr float kGuided = 0.8f;      // share of the rays that follow the light
-constexpr float kEverywhere = 0.1f;  // light in every cell, over the mean
-constexpr double kLeastGain = 1.2;   // of variance
+constexpr size_t kKept = 512;            // rays
+constexpr float kGuided = 0.8f;          // share of the rays that follow the light
+constexpr float kEverywhere = 0.1f;      // light in every cell, over the mean
+constexpr double kLeastGain = 1.2;       // of variance
+constexpr double kLeastVariance = 0.05;  // over the mean square; what is less may be the chance of which rays were kept
 
 // Where `value` lies among the cells of a cumulative density, in [0, 1), and the density there.
 struct Found {
@@ -105,7 +106,8 @@ std::optional<GatherGuide> FoundLight::GuideAt(Vec3f position, const Frame& fram
   }
   // Variances, over the second moment of unguided rays.
   const double guided = static_cast<double>(mean) * static_cast<double>(mean) - mean_share_;
-  if (1 - mean_share_ < kLeastGain * std::max(guided, 0.0)) return std::nullopt;
+  const double unguided = 1 - mean_share_;
+  if (unguided < kLeastVariance || unguided < kLeastGain * guided) return std::nullopt;
   for (float& w : weight) w = (1 - kGuided) * mean + kGuided * w;
   return GatherGuide(weight);
 }

@@ -23,7 +23,7 @@ QualityNumbers NumbersOf(Quality quality) {
     case Quality::kHigh:
       break;
   }
-  return {32, 4096, 64, 0.015f};
+  return {32, 4096, 64, 0.009f};
 }
 
 constexpr int64_t kLeastPhotons = 32768;

@@ -1,0 +1,110 @@
+#include "worker/gather/guide.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/statistics.h"
+#include "worker/sample/sobol.h"
+#include "worker/sample/warp.h"
+
+namespace bakewell {
+namespace {
+
+constexpr Frame kUp{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+TEST(GatherSquare, IsTheInverseOfGatherHemisphere) {
+  TestRandom random(1);
+  for (int i = 0; i < 10000; ++i) {
+    const Vec2f u{random.Unit(), random.Unit()};
+    const Vec2f back = GatherSquare(GatherHemisphere(u));
+    EXPECT_NEAR(back.x, u.x, 1e-5);
+    EXPECT_NEAR(back.y, u.y, 1e-5);
+  }
+}
+
+TEST(GatherGuide, DensityIsThatOfItsSamples) {
+  TestRandom random(2);
+  std::array<float, GatherGuide::kCells> weight{};
+  double sum = 0;
+  for (float& w : weight) {
+    w = 0.01f + std::pow(random.Unit(), 4.0f);
+    sum += static_cast<double>(w);
+  }
+  const GatherGuide guide(weight);
+  constexpr int kSamples = 1 << 18;
+  const SobolSet set(3);
+  std::array<double, GatherGuide::kCells> count{};
+  for (int i = 0; i < kSamples; ++i) {
+    const GatherGuide::Sample sample = guide.Draw(set.At(static_cast<uint32_t>(i)).Get2(0));
+    const size_t row = static_cast<size_t>(sample.primary.x * GatherGuide::kRows);
+    const size_t cell = row * GatherGuide::kColumns + static_cast<size_t>(sample.primary.y * GatherGuide::kColumns);
+    ASSERT_LT(cell, weight.size());
+    EXPECT_NEAR(static_cast<double>(sample.density), static_cast<double>(weight[cell]) * GatherGuide::kCells / sum,
+                1e-3);
+    count[cell] += 1.0 / kSamples;
+  }
+  for (size_t i = 0; i < count.size(); ++i) EXPECT_NEAR(count[i], static_cast<double>(weight[i]) / sum, 1e-4) << i;
+}
+
+TEST(GatherGuide, EndsOfTheSquareStayInside) {
+  std::array<float, GatherGuide::kCells> weight{};
+  weight.fill(1e-6f);
+  weight.back() = 1;
+  const GatherGuide guide(weight);
+  for (const float u : {0.0f, 0x1.fffffep-1f}) {
+    const GatherGuide::Sample sample = guide.Draw({u, u});
+    EXPECT_GT(sample.density, 0);
+    EXPECT_LT(sample.primary.x, 1);
+    EXPECT_LT(sample.primary.y, 1);
+  }
+}
+
+// Rays of a texel at the origin under a bright disc at `place`, seen under an angle of 0.2 rad, and a dim sky.
+FoundLight LookAround(Vec3f place, float sky, int rays) {
+  FoundLight found;
+  TestRandom random(4);
+  for (int i = 0; i < rays; ++i) {
+    const Vec3f dir = GatherHemisphere({random.Unit(), random.Unit()});
+    const bool bright = Dot(dir, NormalizeOrZero(place)) > std::cos(0.2f);
+    found.Add(bright ? dir * Length(place) : dir, !bright, bright ? 50.0f : sky);
+  }
+  found.Resample(rays, 0.5f);
+  return found;
+}
+
+TEST(FoundLight, GuidesRaysToIt) {
+  const Vec3f place{1, 2, 2};
+  const FoundLight found = LookAround(place, 1, 4000);
+  // From elsewhere the light lies in another direction.
+  for (const Vec3f from : {Vec3f{0, 0, 0}, Vec3f{1, 0, 0}, Vec3f{0, -1, 0}}) {
+    const auto guide = found.GuideAt(from, kUp);
+    ASSERT_TRUE(guide.has_value());
+    const SobolSet set(5);
+    int at_light = 0, unguided = 0;
+    double mean = 0;
+    constexpr int kSamples = 4096;
+    const auto meets = [&](Vec2f u) {
+      return Dot(GatherHemisphere(u), NormalizeOrZero(place - from)) > std::cos(0.2f);
+    };
+    for (uint32_t i = 0; i < kSamples; ++i) {
+      const Vec2f u = set.At(i).Get2(0);
+      const GatherGuide::Sample sample = guide->Draw(u);
+      at_light += meets(sample.primary) ? 1 : 0;
+      unguided += meets(u) ? 1 : 0;
+      mean += (meets(sample.primary) ? 1.0 : 0.0) / static_cast<double>(sample.density) / kSamples;
+    }
+    EXPECT_GT(at_light, 3 * unguided);
+    EXPECT_NEAR(mean, static_cast<double>(unguided) / kSamples, 0.1 * unguided / kSamples) << "unbiased";
+  }
+}
+
+TEST(FoundLight, GuidesNobodyWhereAllDirectionsAreAlike) {
+  EXPECT_FALSE(LookAround({0, 0, 1}, 50, 4000).GuideAt({}, kUp).has_value());
+  FoundLight nothing;
+  nothing.Resample(0, 0.5f);
+  EXPECT_FALSE(nothing.GuideAt({}, kUp).has_value());
+}
+
+}  // namespace
+}  // namespace bakewell
