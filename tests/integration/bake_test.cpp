@@ -83,7 +83,7 @@ void ExpectTheBytesOfTheBareKernels(const BakeSettings& settings) {
     }
     BakeTally of_page;
     SkipCount bands;
-    DropBands(prepared->texels, page, asked.target_error, asked.floor_share, baked->lights, bands);
+    DropBands(prepared->texels, page, asked.target_error, baked->lights, bands);
     of_page.Count(Skip::kShBands, bands);
     of_page.Count(lights, page == 0 ? baked->filter : FilterCounters());
     tally.Add(of_page);

@@ -20,28 +20,24 @@ float LengthOfBand(const RadianceSh& sh, int l) {
 
 }  // namespace
 
-void DropBands(const TexelMap& map, int page, float target_error, float floor_share, std::span<TexelLight> lights,
-               SkipCount& count) {
+void DropBands(const TexelMap& map, int page, float target_error, std::span<TexelLight> lights, SkipCount& count) {
   std::map<int32_t, std::vector<size_t>> charts;
-  double sum = 0, texels = 0;
   for (size_t i = 0; i < map.texels.size(); ++i) {
-    if (map.texels[i].page != page || !lights[i].valid) continue;
-    charts[map.texels[i].chart].push_back(i);
-    sum += static_cast<double>(Luminance(lights[i].irradiance));
-    texels += 1;
+    if (map.texels[i].page == page && lights[i].valid) charts[map.texels[i].chart].push_back(i);
   }
-  const float mean = texels > 0 ? static_cast<float>(sum / texels) : 0;
   for (const auto& [chart, members] : charts) {
     count.of += 2;
+    double mean = 0;
+    for (const size_t i : members)
+      mean += static_cast<double>(Luminance(lights[i].irradiance)) / static_cast<double>(members.size());
+    const double tolerated = static_cast<double>(target_error) * mean;
     for (const int l : {2, 1}) {
       double square = 0;
       for (const size_t i : members) {
-        const float tolerated =
-            target_error * std::sqrt(mean * std::max(Luminance(lights[i].irradiance), floor_share * mean));
-        const float most = kMostOfBand[static_cast<size_t>(l)] * LengthOfBand(lights[i].sh, l);
-        square += most > 0 ? std::pow(static_cast<double>(most) / static_cast<double>(tolerated), 2) : 0;
+        const double most = static_cast<double>(kMostOfBand[static_cast<size_t>(l)] * LengthOfBand(lights[i].sh, l));
+        square += most * most / static_cast<double>(members.size());
       }
-      if (!(square <= static_cast<double>(members.size()))) break;
+      if (!(square <= tolerated * tolerated)) break;
       if (square <= 0) continue;
       ++count.skipped;
       count.saved += (2 * l + 1) * std::ssize(members);

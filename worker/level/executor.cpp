@@ -268,7 +268,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
   if (!work.settings.no_skip.Has(Skip::kShBands)) {
     const GatherOptions asked = BudgetOf(work.settings, level->texels->texel_count()).gather;
     SkipCount dropped;
-    DropBands(*texels, page, asked.target_error, asked.floor_share, lights, dropped);
+    DropBands(*texels, page, asked.target_error, lights, dropped);
     tally.Count(Skip::kShBands, dropped);
   }
   tally.Count(std::span(lights).first(next), filtered);

@@ -23,10 +23,11 @@ QualityNumbers NumbersOf(Quality quality) {
     case Quality::kHigh:
       break;
   }
-  return {32, 4096, 64, 0.009f};
+  return {32, 4096, 256, 0.009f};
 }
 
 constexpr int64_t kLeastPhotons = 32768;
+constexpr int64_t kMostPhotons = 4'000'000'000;  // their cells and the cache fit into 4 GB
 
 }  // namespace
 
@@ -52,8 +53,8 @@ Budget BudgetOf(const BakeSettings& settings, int64_t texels) {
   budget.gather.seed = settings.seed;
   budget.gather.filter = Filters(settings);
   budget.gather.no_skip = settings.no_skip;
-  budget.photons =
-      settings.photons > 0 ? settings.photons : std::max(kLeastPhotons, texels * numbers.photons_per_texel);
+  budget.photons = settings.photons > 0 ? settings.photons
+                                        : std::clamp(texels * numbers.photons_per_texel, kLeastPhotons, kMostPhotons);
   return budget;
 }
 

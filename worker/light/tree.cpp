@@ -10,7 +10,8 @@
 namespace bakewell {
 namespace {
 
-constexpr float kSlackRad = 1e-3f;         // rounding of the angles below
+constexpr float kSlackRad = 1e-3f;         // rounding of cones that are joined
+constexpr float kSlack = 1e-5f;            // rounding of the cosines that Importance compares
 constexpr float kClearlyFarther = 1.001f;  // more than rounding makes of equal distances
 constexpr float kSplitSteps = 1000;        // places told apart along the line that lights are split along
 
@@ -52,6 +53,8 @@ Vec3f FarthestFrom(Vec3f from, const std::vector<std::pair<Vec3f, int>>& points)
   }
   return result;
 }
+
+float SineOf(float cosine) { return std::sqrt(std::max(0.0f, 1 - cosine * cosine)); }
 
 float AngleBetween(Vec3f a, Vec3f b) { return std::acos(std::clamp(Dot(a, b), -1.0f, 1.0f)); }
 
@@ -131,7 +134,9 @@ void LightTree::Enclose(Node& node) const {
     node.center = shape.center;
     node.radius = shape.radius;
     node.axis = shape.axis;
-    node.cone_rad = shape.cone_rad + kSlackRad;
+    node.cone_rad = std::min(kPiF, shape.cone_rad + kSlackRad);
+    node.cos_cone = std::cos(node.cone_rad);
+    node.sin_cone = std::sin(node.cone_rad);
     node.intensity = shape.intensity;
     return;
   }
@@ -147,6 +152,8 @@ void LightTree::Enclose(Node& node) const {
   }
   node.radius *= 1.0001f;
   std::tie(node.axis, node.cone_rad) = Join(a.axis, a.cone_rad, b.axis, b.cone_rad);
+  node.cos_cone = std::cos(node.cone_rad);
+  node.sin_cone = std::sin(node.cone_rad);
   node.intensity = a.intensity + b.intensity;
 }
 
@@ -160,16 +167,23 @@ float LightTree::Importance(int node, const Place& place) const {
   const float distance2 = std::max(distance * distance, 0.25f * reach * reach);
   if (distance <= reach || !(distance > 0)) return n.intensity / std::max(distance2, 1e-30f);
   const Vec3f dir = to_light / distance;
-  // Directions to the lights lie within this angle of `dir`.
-  const float spread = std::asin(std::min(1.0f, reach / distance)) + kSlackRad;
+  // Directions to the lights lie within an angle of this sine of `dir`.
+  const float sin_spread = reach / distance, cos_spread = std::sqrt(1 - sin_spread * sin_spread);
   float cosine = 1;
   if (Dot(place.normal, place.normal) > 0.5f) {
-    const float angle = AngleBetween(place.normal, dir) - spread;
-    if (angle >= kPiF / 2) return 0;
-    cosine = std::max(0.01f, std::cos(std::max(0.0f, angle)));
+    const float facing = Dot(place.normal, dir);
+    if (facing < cos_spread) {
+      // Of the angle to the normal, less the spread.
+      cosine = facing * cos_spread + SineOf(facing) * sin_spread;
+      if (cosine <= -kSlack) return 0;
+      cosine = std::max(0.01f, cosine);
+    }
   }
-  const float beyond = AngleBetween(n.axis, -dir) - spread;
-  if (beyond >= n.cone_rad) return 0;
+  // The cone widened by the spread, unless that is everywhere.
+  if (n.sin_cone * cos_spread + n.cos_cone * sin_spread > 0 &&
+      -Dot(n.axis, dir) <= n.cos_cone * cos_spread - n.sin_cone * sin_spread - kSlack) {
+    return 0;
+  }
   return n.intensity * cosine / distance2;
 }
 

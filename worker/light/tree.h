@@ -53,6 +53,7 @@ class LightTree {
     float radius = 0;     // of the sphere around the lights [m]
     Vec3f axis{0, 0, 1};  // of the cone of emission
     float cone_rad = 0;   // its half angle, falloff included; pi: to everywhere
+    float cos_cone = 1, sin_cone = 0;
     float intensity = 0;  // luminance, of all together along their brightest directions [W sr^-1]
     int left = -1, right = -1, parent = -1;
     int begin = 0, end = 0;  // lights_[begin, end)

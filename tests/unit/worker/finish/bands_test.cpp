@@ -7,7 +7,7 @@
 namespace bakewell {
 namespace {
 
-constexpr float kTarget = 0.04f, kFloor = 0.25f;
+constexpr float kTarget = 0.04f;
 
 // Two charts of 32 texels under light from above, the second with another light from the side, both with noise in
 // l = 2.
@@ -35,7 +35,7 @@ struct Page {
   }
   SkipCount Drop() {
     SkipCount count;
-    DropBands(map, 0, kTarget, kFloor, lights, count);
+    DropBands(map, 0, kTarget, lights, count);
     return count;
   }
 };
@@ -71,6 +71,17 @@ TEST(DropBands, NoiseBelowTheTargetGoesAndLightStays) {
   EXPECT_LT(std::sqrt(square), 3 * kTarget) << "over every texel's worst normal";
   EXPECT_GT(square, 0);
   for (size_t i = 32; i < 64; ++i) EXPECT_EQ(page.lights[i].sh.lambda[8], before[i].sh.lambda[8]);
+}
+
+// A dim chart is judged by itself: beside a bright one it keeps what shapes its light.
+TEST(DropBands, DimChartsKeepTheirShape) {
+  Page page(0.05f);
+  for (size_t i = 32; i < 64; ++i) {
+    page.lights[i].irradiance = page.lights[i].irradiance * 1e-4f;
+    for (Rgb& lambda : page.lights[i].sh.lambda) lambda = lambda * 1e-4f;
+  }
+  EXPECT_EQ(page.Drop().skipped, 1);
+  EXPECT_GT(page.lights[40].sh.lambda[8].x, 0);
 }
 
 TEST(DropBands, WhatIsAboveTheTargetStays) {
