@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "tests/support/bake_scene.h"
+#include "worker/finish/bands.h"
 #include "worker/level/page_files.h"
 
 namespace bakewell {
@@ -21,9 +22,12 @@ absl::Status Run(char** words) {
   SilentProgress progress;
   BAKEWELL_ASSIGN_OR_RETURN(LoadedLevel level, LoadLevel(words[1]));
   BAKEWELL_ASSIGN_OR_RETURN(const PreparedLevel prepared, PrepareLevel(std::move(level), settings, clock, progress));
-  BAKEWELL_ASSIGN_OR_RETURN(const BakedTexels baked, BakeTexels(prepared, settings, clock, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(BakedTexels baked, BakeTexels(prepared, settings, clock, progress));
+  const GatherOptions asked = BudgetOf(settings, std::ssize(prepared.texels.texels)).gather;
   std::filesystem::create_directories(words[2]);
   for (int page = 0; page < static_cast<int>(prepared.texels.pages.size()); ++page) {
+    SkipCount bands;
+    DropBands(prepared.texels, page, asked.target_error, baked.lights, bands);
     BAKEWELL_ASSIGN_OR_RETURN(const MadeOutputs files, PageFiles(prepared.texels, baked.lights, page));
     for (const MadeOutput& file : files) {
       std::ofstream(std::filesystem::path(words[2]) / file.name, std::ios::binary) << file.bytes;
