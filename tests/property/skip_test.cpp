@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "tests/support/bake_scene.h"
+#include "tests/support/scene_builder.h"
 #include "tests/support/skip_levels.h"
 #include "tests/support/statistics.h"
 #include "worker/texel/texels.h"
@@ -78,6 +79,30 @@ TEST(Skip, EverythingTogetherStaysWithinTheTarget) {
     // Medium quality asks for 4 %, of either: they differ by no more than both together.
     EXPECT_LT(RelativeRms(on.lights(), off.lights()), 0.04 * std::sqrt(2.0));
   }
+}
+
+// A cellar with a lamp a millionth as bright as the one upstairs: no photon goes there, and all that there is of light
+// lies far below what the bake's mean tolerates.
+TEST(Skip, DimRoomsKeepTheirOwnLight) {
+  SceneBuilder builder({64, 32});
+  for (int k = 0; k < 2; ++k) {
+    const float x = static_cast<float>(32 * k);
+    builder.AddRoom({10.0 * k, 0, 0}, {10.0 * k + 4, 3, 4}, {.material = 0, .page = {x, 0, 32, 32}});
+    const float intensity = k == 0 ? 1 : 1e-6f;
+    builder.AddPointLight({10.0 * k + 2, 1.5, 2}, {intensity, intensity, intensity});
+  }
+  const Scene scene = builder.Build();
+  // Cells that no photon met are black with or without: that is the photons' limit.
+  const BakeSettings none = Without({Skip::kDarkCharts, Skip::kCulledLights});
+  const BakedScene on = BakeSceneInMemory(scene, {}), off = BakeSceneInMemory(scene, none);
+  double with = 0, without = 0;
+  for (size_t i = 0; i < on.lights().size(); ++i) {
+    if (on.texels()[i].x < 32) continue;
+    with += static_cast<double>(Luminance(on.lights()[i].irradiance));
+    without += static_cast<double>(Luminance(off.lights()[i].irradiance));
+  }
+  EXPECT_GT(without, 0);
+  EXPECT_NEAR(with / without, 1, 1e-6);
 }
 
 // A gather whose photons are few and said to carry next to nothing: wherever none landed counts as dark for sure.

@@ -26,8 +26,9 @@ class SetNoise {
   float Correction() const {
     if (!(variance_ > 0) || !(halving_[2] > 0)) return 1;
     constexpr double kLeastFall = 0.1, kMostFall = 0.5, kLeast = 0.1;  // 1/2 for independent samples
+    constexpr double kMargin = 1.2;  // a tile's texels tell the falls only so well: errors err on the safe side
     const double fall = std::clamp(std::sqrt(halving_[0] / halving_[2]), kLeastFall, kMostFall);
-    return static_cast<float>(std::clamp(halving_[0] * fall / (1 - fall) / variance_, kLeast, 1.0));
+    return static_cast<float>(std::clamp(kMargin * halving_[0] * fall / (1 - fall) / variance_, kLeast, 1.0));
   }
 
  private:
