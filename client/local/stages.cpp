@@ -31,11 +31,10 @@ absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSe
   const LightSet& lights = *prepared.lights;
   Photons result;
   clock.Begin("photons");
-  const EmissionGuide guide =
-      EmissionGuide::Learn(world, lights, prepared.layout, prepared.texels,
-                           static_cast<int>(std::min<int64_t>(count / 16, 100000)), settings.seed);
+  const EmissionGuide guide = EmissionGuide::Learn(world, lights, prepared.layout, prepared.texels,
+                                                   EmissionGuide::WalksFor(lights, count), settings.seed);
   const PhotonPlan plan = PlanPhotons(lights, guide, count, settings.seed);
-  result.cells = SurfaceCells::Build(world, CellsFor(count));
+  result.cells = SurfaceCells::Build(world, CellsFor(count), guide.seen());
   PhotonMap map;
   map.flux.resize(2 * result.cells.cells().size());
   const int batches = settings.photon_batches;

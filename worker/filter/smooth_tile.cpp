@@ -37,6 +37,7 @@ std::vector<uint8_t> SmoothTile::Connect(const World& world, const std::vector<b
       }
     }
   }
+  grid_.MeasureRoom();
   return open;
 }
 

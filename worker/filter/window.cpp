@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace bakewell {
 namespace {
@@ -18,14 +19,21 @@ constexpr double kRidge = 1e-3;      // holds slopes back, so that texels in one
 
 // Sums over a window's texels for a first-order regression over their offsets x, y [texels].
 struct Moments {
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-  void Add(double dx, double dy) {
-    n += 1;
-    x += dx;
-    y += dy;
-    xx += dx * dx;
-    xy += dx * dy;
-    yy += dy * dy;
+  int n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  void Add(int dx, int dy, int count) {
+    n += count;
+    x += count * dx;
+    y += count * dy;
+    xx += count * dx * dx;
+    xy += count * dx * dy;
+    yy += count * dy * dy;
+  }
+  // The 8 r texels at Chebyshev distance r.
+  void AddRing(int r) {
+    const int squares = 2 * r * (r + 1) * (2 * r + 1) / 3 + 2 * (2 * r - 1) * r * r;
+    n += 8 * r;
+    xx += squares;
+    yy += squares;
   }
 };
 
@@ -35,8 +43,13 @@ struct Weights {
 
   // First row of the inverse of the normal equations.
   explicit Weights(const Moments& m) {
-    const double xx = m.xx + kRidge * m.n, yy = m.yy + kRidge * m.n;
-    const double c0 = xx * yy - m.xy * m.xy, c1 = m.xy * m.y - m.x * yy, c2 = m.x * m.xy - xx * m.y;
+    if (m.x == 0 && m.y == 0) {
+      constant = 1.0 / m.n;
+      x = y = 0;
+      return;
+    }
+    const double xx = m.xx + kRidge * m.n, yy = m.yy + kRidge * m.n, xy = m.xy;
+    const double c0 = xx * yy - xy * xy, c1 = xy * m.y - m.x * yy, c2 = m.x * xy - xx * m.y;
     const double det = m.n * c0 + m.x * c1 + m.y * c2;
     constant = c0 / det;
     x = c1 / det;
@@ -49,6 +62,52 @@ struct Weights {
            2 * (constant * x * m.x + constant * y * m.y + x * y * m.xy);
   }
 };
+
+// One texel of a ring around a window: its offset, and which of kNeighbours lies towards the centre.
+struct RingStep {
+  int8_t dx, dy;
+  uint8_t inward;
+};
+
+// The rings of a window, once around each.
+class Rings {
+ public:
+  constexpr Rings() {
+    size_t i = 0;
+    for (int r = 1; r <= SmoothGrid::kMostRadius; ++r) {
+      for (int s = 0; s < 8 * r; ++s) {
+        const int along = s % (2 * r) - r;
+        switch (s / (2 * r)) {
+          case 0:
+            steps_[i++] = Step(along, -r);
+            break;
+          case 1:
+            steps_[i++] = Step(r, along);
+            break;
+          case 2:
+            steps_[i++] = Step(-along, r);
+            break;
+          default:
+            steps_[i++] = Step(-r, -along);
+        }
+      }
+    }
+  }
+  // 8 r texels.
+  constexpr std::span<const RingStep> Ring(int r) const {
+    return std::span(steps_).subspan(static_cast<size_t>(4 * r * (r - 1)), static_cast<size_t>(8 * r));
+  }
+
+ private:
+  static constexpr RingStep Step(int dx, int dy) {
+    constexpr std::array<uint8_t, 9> kDirection = {5, 6, 7, 4, 0, 0, 3, 2, 1};
+    const int in_x = (dx < 0) - (dx > 0), in_y = (dy < 0) - (dy > 0);
+    return {static_cast<int8_t>(dx), static_cast<int8_t>(dy),
+            kDirection[static_cast<size_t>(3 * (in_y + 1) + in_x + 1)]};
+  }
+  std::array<RingStep, static_cast<size_t>(4 * SmoothGrid::kMostRadius * (SmoothGrid::kMostRadius + 1))> steps_{};
+};
+constexpr Rings kRings;
 
 }  // namespace
 
@@ -83,6 +142,53 @@ void SmoothGrid::Connect(int x, int y, int k) {
   At(nx, ny).open |= static_cast<uint8_t>(1U << ((k + 4) % 8));
 }
 
+void SmoothGrid::MeasureRoom() {
+  // Chebyshev distance to the nearest texel that lacks a connection, by two sweeps.
+  const auto sweep = [this](int x, int y, size_t first) {
+    SmoothCell& cell = At(x, y);
+    if (cell.open != 0xff) {
+      cell.room = 0;
+      return;
+    }
+    for (size_t k = first; k < first + 4; ++k) {
+      const SmoothCell& other = At(x + kNeighbours[k][0], y + kNeighbours[k][1]);
+      cell.room = std::min(cell.room, static_cast<uint8_t>(other.room + 1));
+    }
+  };
+  constexpr size_t kLater = 0, kEarlier = 4;  // of kNeighbours, in reading order
+  for (SmoothCell& cell : cells_) cell.room = kMostRadius;
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) sweep(x, y, kEarlier);
+  }
+  for (int y = height_; y-- > 0;) {
+    for (int x = width_; x-- > 0;) sweep(x, y, kLater);
+  }
+  NumberParts();
+}
+
+void SmoothGrid::NumberParts() {
+  constexpr uint8_t kMostParts = 255;
+  uint8_t part = 0;
+  std::vector<size_t> waiting;
+  for (size_t first = 0; first < cells_.size(); ++first) {
+    if (cells_[first].part != 0 || cells_[first].open == 0) continue;
+    part = part % kMostParts + 1;
+    cells_[first].part = part;
+    waiting.push_back(first);
+    while (!waiting.empty()) {
+      const size_t at = waiting.back();
+      waiting.pop_back();
+      for (size_t k = 0; k < kNeighbours.size(); ++k) {
+        if (!(cells_[at].open >> k & 1)) continue;
+        const size_t next = at + static_cast<size_t>(kNeighbours[k][1] * width_ + kNeighbours[k][0]);
+        if (cells_[next].part != 0) continue;
+        cells_[next].part = part;
+        waiting.push_back(next);
+      }
+    }
+  }
+}
+
 float SmoothGrid::PooledVariance(int x, int y) const {
   const SmoothCell& cell = At(x, y);
   float sum = cell.variance;
@@ -100,7 +206,7 @@ float SmoothGrid::PooledVariance(int x, int y) const {
 // A window that grows ring by ring.
 class SmoothGrid::Growth {
  public:
-  Growth(const SmoothGrid& grid, int x, int y) : grid_(grid), x_(x), y_(y) { Add(0, 0); }
+  Growth(const SmoothGrid& grid, int x, int y) : grid_(grid), x_(x), y_(y), part_(grid.At(x, y).part) { Add(0, 0); }
 
   int radius() const { return radius_; }
   const Moments& known() const { return known_; }  // texels with a value
@@ -111,15 +217,17 @@ class SmoothGrid::Growth {
     const Moments& m = known_;
     if (m.n < kLeastStrays) return kInfinity;
     // Values are counted from their mean.
-    const double mean = value_ / m.n, vx = value_x_ - mean * m.x, vy = value_y_ - mean * m.y;
-    const double xx = m.xx - m.x * m.x / m.n, xy = m.xy - m.x * m.y / m.n, yy = m.yy - m.y * m.y / m.n;
+    const double n = m.n, mean = value_ / n, vx = value_x_ - mean * m.x, vy = value_y_ - mean * m.y;
+    const double xx = m.xx - m.x * m.x / n, xy = m.xy - m.x * m.y / n, yy = m.yy - m.y * m.y / n;
     const double det = xx * yy - xy * xy;
     if (!(det > 1e-6 * xx * yy)) return kInfinity;
     const double slope_x = (yy * vx - xy * vy) / det, slope_y = (xx * vy - xy * vx) / det;
     const double square = square_ - value_ * mean - slope_x * vx - slope_y * vy;
     return std::max(0.0, square) / (m.n - 3);
   }
-  bool Has(int dx, int dy) const { return inside_[Window::Index(dx, dy)]; }
+  bool Has(int dx, int dy) const {
+    return std::max(std::abs(dx), std::abs(dy)) <= square_radius_ || inside_[Window::Index(dx, dy)];
+  }
 
   // The regression's value at the centre.
   double Estimate(const Weights& w) const { return w.constant * value_ + w.x * value_x_ + w.y * value_y_; }
@@ -133,60 +241,89 @@ class SmoothGrid::Growth {
   // Adds the next ring's texels that are connected to the window. False where there are none.
   bool Grow() {
     const int r = ++radius_;
-    int joined = 0;
+    if (r <= grid_.At(x_, y_).room) return AddRing();
+    int joined = 0, left = 0;
     // There and back again, so that texels of the ring that are reached along it join too.
-    for (const bool forth : {true, false}) {
-      if (joined == 8 * r) break;
-      for (int step = 0; step < 8 * r; ++step) {
-        const int s = forth ? step : 8 * r - 1 - step, along = s % (2 * r) - r;
-        switch (s / (2 * r)) {
-          case 0:
-            joined += TryJoin(along, -r) ? 1 : 0;
-            break;
-          case 1:
-            joined += TryJoin(r, along) ? 1 : 0;
-            break;
-          case 2:
-            joined += TryJoin(-along, r) ? 1 : 0;
-            break;
-          default:
-            joined += TryJoin(-r, -along) ? 1 : 0;
-        }
-      }
-    }
+    const std::span<const RingStep> ring = kRings.Ring(r);
+    for (const RingStep& step : ring) Try(step, joined, left);
+    if (joined == 0 || left == 0) return joined > 0;
+    for (size_t i = ring.size(); i-- > 0;) Try(ring[i], joined, left);
     return joined > 0;
   }
 
  private:
-  bool TryJoin(int dx, int dy) {
-    const int x = x_ + dx, y = y_ + dy;
-    if (!grid_.Contains(x, y) || inside_[Window::Index(dx, dy)]) return false;
-    const uint8_t open = grid_.At(x, y).open;
-    if (open == 0) return false;
+  void Try(const RingStep& step, int& joined, int& left) {
+    const int x = x_ + step.dx, y = y_ + step.dy;
+    if (!grid_.Contains(x, y)) return;
+    const SmoothCell& cell = grid_.At(x, y);
+    if (cell.part != part_ || cell.open == 0) return;
+    bool& inside = inside_[Window::Index(step.dx, step.dy)];
+    if (inside) return;
     // Towards the centre first: on a plain surface that is all there is to ask.
-    const size_t inward = Direction((dx < 0) - (dx > 0), (dy < 0) - (dy > 0));
     for (size_t turn = 0; turn < kNeighbours.size(); ++turn) {
-      const size_t k = (inward + turn) % kNeighbours.size();
-      if (!(open >> k & 1)) continue;
-      const int ix = dx + kNeighbours[k][0], iy = dy + kNeighbours[k][1];
-      if (std::max(std::abs(ix), std::abs(iy)) > radius_ || !inside_[Window::Index(ix, iy)]) continue;
-      Add(dx, dy);
-      return true;
+      const size_t k = (step.inward + turn) % kNeighbours.size();
+      if (!(cell.open >> k & 1)) continue;
+      const int ix = step.dx + kNeighbours[k][0], iy = step.dy + kNeighbours[k][1];
+      if (std::max(std::abs(ix), std::abs(iy)) > radius_ || !Has(ix, iy)) continue;
+      inside = true;
+      Add(step.dx, step.dy);
+      ++joined;
+      return;
     }
-    return false;
+    ++left;
   }
 
-  static size_t Direction(int dx, int dy) {
-    constexpr std::array<uint8_t, 9> kDirection = {5, 6, 7, 4, 0, 0, 3, 2, 1};
-    return kDirection[static_cast<size_t>(3 * (dy + 1) + dx + 1)];
+  // A ring of which everything is connected.
+  bool AddRing() {
+    const int r = square_radius_ = radius_;
+    all_.AddRing(r);
+    RowSums above = RowAt(-r, r), below = RowAt(r, r), left, right;
+    for (int dy = 1 - r; dy < r; ++dy) {
+      left.Add(grid_.At(x_ - r, y_ + dy), dy);
+      right.Add(grid_.At(x_ + r, y_ + dy), dy);
+    }
+    if (above.known + below.known + left.known + right.known == 8 * r) {
+      known_.AddRing(r);
+    } else {
+      for (int d = -r; d <= r; ++d) {
+        for (const int dy : {-r, r}) known_.Add(d, dy, grid_.At(x_ + d, y_ + dy).known ? 1 : 0);
+        if (std::abs(d) == r) continue;
+        for (const int dx : {-r, r}) known_.Add(dx, d, grid_.At(x_ + dx, y_ + d).known ? 1 : 0);
+      }
+    }
+    value_ += above.value + below.value + left.value + right.value;
+    square_ += above.square + below.square + left.square + right.square;
+    variance_ += above.variance + below.variance + left.variance + right.variance;
+    value_x_ += above.moment + below.moment + r * (right.value - left.value);
+    value_y_ += left.moment + right.moment + r * (below.value - above.value);
+    return true;
+  }
+
+  // Over texels in a line, of those that are known.
+  struct RowSums {
+    int known = 0;
+    double value = 0, square = 0, moment = 0, variance = 0;
+    void Add(const SmoothCell& cell, int along) {
+      const double v = cell.known ? static_cast<double>(cell.value) : 0;
+      known += cell.known ? 1 : 0;
+      value += v;
+      square += v * v;
+      moment += v * along;
+      variance += cell.known ? static_cast<double>(cell.variance) : 0;
+    }
+  };
+  RowSums RowAt(int dy, int reach) const {
+    RowSums sums;
+    const SmoothCell* row = &grid_.At(x_, y_ + dy);
+    for (int dx = -reach; dx <= reach; ++dx) sums.Add(row[dx], dx);
+    return sums;
   }
 
   void Add(int dx, int dy) {
-    inside_[Window::Index(dx, dy)] = true;
-    all_.Add(dx, dy);
+    all_.Add(dx, dy, 1);
     const SmoothCell& cell = grid_.At(x_ + dx, y_ + dy);
     if (!cell.known) return;
-    known_.Add(dx, dy);
+    known_.Add(dx, dy, 1);
     const double value = static_cast<double>(cell.value);
     value_ += value;
     square_ += value * value;
@@ -197,7 +334,8 @@ class SmoothGrid::Growth {
 
   const SmoothGrid& grid_;
   const int x_, y_;
-  int radius_ = 0;
+  const uint8_t part_;
+  int radius_ = 0, square_radius_ = 0;  // up to square_radius_ everything is inside
   Moments known_, all_;
   double value_ = 0, square_ = 0, value_x_ = 0, value_y_ = 0, variance_ = 0;
   std::array<bool, (2 * kMostRadius + 1) * (2 * kMostRadius + 1)> inside_{};

@@ -21,6 +21,8 @@ struct SmoothCell {
   float value = 0;
   float variance = 0;  // of value
   uint8_t open = 0;    // bit k: connected to neighbour k; mutual
+  uint8_t room = 0;    // rings around it whose texels are all connected (SmoothGrid::MeasureRoom)
+  uint8_t part = 0;    // connected texels have the same, most others do not
   bool known = false;  // value and variance are there
   float radius = 0;    // of the window that it would choose by itself
 };
@@ -46,6 +48,8 @@ class SmoothGrid {
 
   // Connects (x, y) with its neighbour in direction k, if that lies on the grid.
   void Connect(int x, int y, int k);
+  // After the last Connect: finds how far windows are squares, which need no search, and what cannot be in one window.
+  void MeasureRoom();
 
   // The variance of a known texel as it and its neighbourhood say together: the mean over it and its connected
   // neighbours (eight blocks alone say little), but at most four times its own, so that a quiet texel beside a bright
@@ -87,6 +91,7 @@ class SmoothGrid {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
   class Growth;
+  void NumberParts();
   float PooledVariance(int x, int y) const;
   void AddWeights(const Growth& growth, int x, int y, float share, Window& window) const;
 

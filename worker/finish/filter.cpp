@@ -21,6 +21,7 @@ class PageFilter {
 
   void Run(FilterCounters& counters) {
     for (const uint32_t i : texels_) Put(i);
+    grid_.MeasureRoom();
     std::vector<float> pooled(texels_.size());
     ForEach([&](size_t k, const Texel& texel) { pooled[k] = grid_.NoiseVariance(texel.x, texel.y); });
     ForEach([&](size_t k, const Texel& texel) { grid_.At(texel.x, texel.y).variance = pooled[k]; });

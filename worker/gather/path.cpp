@@ -11,7 +11,7 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int kMaxExtraBounces = 4;
-// A hit nearer than this many neighbourhood widths continues the path.
+// A first hit nearer than this many neighbourhood widths continues the path.
 constexpr float kNearWidths = 1.5f;
 
 float Random(uint32_t key, uint32_t what) { return UnitFloat(HashCombine(key, what)); }
@@ -80,7 +80,8 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
     const size_t cell = 2 * static_cast<size_t>(scene.cells.CellAt(hit.triangle, point.position)) + (hit.back ? 1 : 0);
     const uint8_t window = scene.cache.window[cell];
     const uint32_t step_key = HashCombine(key, static_cast<uint32_t>(bounce));
-    const bool near = hit.t < kNearWidths * scene.cache.cell_size_m * static_cast<float>(window);
+    const float side = scene.cells.patches()[scene.cells.PatchOf(hit.triangle)].cell_side_m;
+    const bool near = bounce == 0 && hit.t < kNearWidths * side * static_cast<float>(window);
     const bool read = (window != 0 && !near) || bounce == kMaxExtraBounces;
     if (read) {
       result.radiance += throughput * (scene.cache.irradiance[cell].direct + scene.cache.irradiance[cell].indirect);

@@ -166,7 +166,6 @@ absl::Status AddPhotons(std::string_view bytes, PhotonMap& into) {
 
 std::string SerializeCache(const RadianceCache& cache) {
   FieldWriter writer;
-  Put(cache.cell_size_m, writer);
   Put(cache.photons_seen, writer);
   Put(cache.rays, writer);
   writer.Put(static_cast<uint64_t>(cache.irradiance.size()));
@@ -182,7 +181,6 @@ std::string SerializeCache(const RadianceCache& cache) {
 absl::StatusOr<RadianceCache> ParseCache(std::string_view bytes) {
   NumberReader reader(bytes);
   RadianceCache cache;
-  Get(reader, cache.cell_size_m);
   Get(reader, cache.photons_seen);
   Get(reader, cache.rays);
   const uint64_t count = reader.Get<uint64_t>();

@@ -79,7 +79,6 @@ namespace {
 
 // Where the guide's walks start, page by page.
 std::vector<TexelPoint> StartsOf(const Level& level, int walks, uint32_t seed) {
-  if (!EmissionGuide::Walks(*level.lights)) return {};
   const TexelPages& texels = *level.texels;
   std::vector<TexelPoint> points(static_cast<size_t>(walks));
   for (int page = 0; page < static_cast<int>(texels.pages().size()); ++page) {
@@ -110,12 +109,12 @@ double AddIrradiance(const TexelMap& texels, const SurfaceCells& cells, const Ra
 
 std::shared_ptr<const PhotonStage> BuildPhotonStage(const Level& level, const BakeSettings& settings) {
   const int64_t count = level.photons;
-  const int walks = static_cast<int>(std::min<int64_t>(count / 16, 100000));
+  const int walks = EmissionGuide::WalksFor(*level.lights, count);
   auto stage = std::make_shared<PhotonStage>();
   stage->guide =
       EmissionGuide::Learn(*level.world, *level.lights, StartsOf(level, walks, settings.seed), settings.seed);
   stage->plan = PlanPhotons(*level.lights, stage->guide, count, settings.seed);
-  stage->cells = SurfaceCells::Build(*level.world, CellsFor(count));
+  stage->cells = SurfaceCells::Build(*level.world, CellsFor(count), stage->guide.seen());
   return stage;
 }
 

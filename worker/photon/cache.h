@@ -23,7 +23,6 @@ struct RadianceCache {
   // Side of the neighbourhood that was averaged, in cells (1, 3, 5, ...); 0: the cell is cut by other geometry, part of
   // it may lie behind a wall, and its value is no evidence.
   std::vector<uint8_t> window;
-  float cell_size_m = 1;
   int64_t photons_seen = 0;
   int64_t rays = 0;
   SkipCount unfaced_backs;  // sides of cells whose patch no photon met, of those with surface; rays

@@ -56,11 +56,38 @@ struct CellSum {
 };
 
 constexpr int64_t kMaxPatchCells = int64_t{1} << 28;
+constexpr int kMostDoublings = 6, kSpared = 2;  // of the smallest cells' sides; doublings that are not worth it
 
-}  // namespace
+// How often each patch's cells are to double their sides: as many rays should meet a cell of a patch as of those that
+// rays meet most often. Patches of which the rays can tell nothing count as such. Whole doublings: a level that is
+// turned keeps its cells, though a ray or two may go elsewhere.
+std::vector<int> DoublingsOf(const World& world, std::span<const std::vector<uint32_t>> patches,
+                             std::span<const uint32_t> seen) {
+  std::vector<double> area(patches.size(), 0), rays(patches.size(), 0);
+  double all = 0, mean = 0;  // the density that a ray finds on the mean
+  for (size_t i = 0; i < patches.size(); ++i) {
+    for (const uint32_t k : patches[i]) {
+      area[i] += AreaOf(world.triangles()[k]);
+      rays[i] += seen.empty() ? 0 : seen[k];
+    }
+    all += rays[i];
+    if (rays[i] > 0) mean += rays[i] * rays[i] / area[i];
+  }
+  std::vector<int> doublings(patches.size(), 0);
+  if (!(mean > 0)) return doublings;
+  mean /= all;
+  constexpr double kPrior = 8;  // rays
+  for (size_t i = 0; i < patches.size(); ++i) {
+    const double density = (rays[i] + kPrior) / (area[i] + kPrior / mean);
+    doublings[i] =
+        std::clamp(static_cast<int>(std::lround(0.5 * std::log2(mean / density))) - kSpared, 0, kMostDoublings);
+  }
+  return doublings;
+}
 
-bool SurfaceCells::MeasurePatch(const World& world, const std::vector<uint32_t>& triangles, CellPatch& patch,
-                                std::vector<SurfaceCell>& cells) const {
+// False where the patch folds over itself.
+bool MeasurePatch(const World& world, const std::vector<uint32_t>& triangles, CellPatch& patch,
+                  std::vector<SurfaceCell>& cells) {
   const Frame frame = FrameFromHint(MeanNormal(world, triangles), LongestBoundaryEdge(world, triangles));
   const Vec3f anchor = world.triangles()[triangles[0]].p0;
   double low_x = 1e300, low_y = 1e300, high_x = -1e300, high_y = -1e300;
@@ -72,13 +99,13 @@ bool SurfaceCells::MeasurePatch(const World& world, const std::vector<uint32_t>&
     }
   }
   patch.origin = anchor + frame.t * static_cast<float>(low_x) + frame.b * static_cast<float>(low_y);
-  const auto divide = [this](double extent) {
-    return std::max(1, static_cast<int>(std::ceil(extent / cell_size_m_ - 1e-3)));
+  const auto divide = [&](double extent) {
+    return std::max(1, static_cast<int>(std::ceil(extent / patch.cell_side_m - 1e-3)));
   };
   patch.width = divide(high_x - low_x);
   patch.height = divide(high_y - low_y);
-  const double side_x = high_x > low_x ? (high_x - low_x) / patch.width : cell_size_m_;
-  const double side_y = high_y > low_y ? (high_y - low_y) / patch.height : cell_size_m_;
+  const double side_x = high_x > low_x ? (high_x - low_x) / patch.width : patch.cell_side_m;
+  const double side_y = high_y > low_y ? (high_y - low_y) / patch.height : patch.cell_side_m;
   patch.t = frame.t * static_cast<float>(1 / side_x);
   patch.b = frame.b * static_cast<float>(1 / side_y);
   BAKEWELL_CHECK_OP(int64_t{patch.width} * patch.height, <, kMaxPatchCells);
@@ -125,14 +152,17 @@ bool SurfaceCells::MeasurePatch(const World& world, const std::vector<uint32_t>&
   return true;
 }
 
-void SurfaceCells::AddPatch(const World& world, std::vector<uint32_t> triangles) {
+}  // namespace
+
+void SurfaceCells::AddPatch(const World& world, std::vector<uint32_t> triangles, float cell_side_m) {
   CellPatch patch;
+  patch.cell_side_m = cell_side_m;
   std::vector<SurfaceCell> cells;
   if (!MeasurePatch(world, triangles, patch, cells)) {
     // The patch folds over itself (a spiral stair): halve it in breadth-first order until it does not.
     const auto middle = triangles.begin() + static_cast<std::ptrdiff_t>(triangles.size() / 2);
-    AddPatch(world, {triangles.begin(), middle});
-    AddPatch(world, {middle, triangles.end()});
+    AddPatch(world, {triangles.begin(), middle}, cell_side_m);
+    AddPatch(world, {middle, triangles.end()}, cell_side_m);
     return;
   }
   patch.first_cell = static_cast<uint32_t>(cells_.size());
@@ -141,14 +171,21 @@ void SurfaceCells::AddPatch(const World& world, std::vector<uint32_t> triangles)
   cells_.insert(cells_.end(), cells.begin(), cells.end());
 }
 
-SurfaceCells SurfaceCells::Build(const World& world, int64_t target_cells) {
+SurfaceCells SurfaceCells::Build(const World& world, int64_t target_cells, std::span<const uint32_t> seen) {
   SurfaceCells result;
   for (const Triangle& t : world.triangles()) result.total_area_ += AreaOf(t);
   if (world.triangles().empty()) return result;
-  result.cell_size_m_ =
-      static_cast<float>(std::sqrt(result.total_area_ / static_cast<double>(std::max<int64_t>(target_cells, 1))));
   result.patch_of_triangle_.assign(world.triangles().size(), 0);
-  for (auto& patch : GrowPatches(world)) result.AddPatch(world, std::move(patch));
+  std::vector<std::vector<uint32_t>> patches = GrowPatches(world);
+  const std::vector<int> doublings = DoublingsOf(world, patches, seen);
+  double squares = 0;  // of the smallest cells' sides
+  for (size_t i = 0; i < patches.size(); ++i) {
+    for (const uint32_t k : patches[i]) squares += std::ldexp(AreaOf(world.triangles()[k]), -2 * doublings[i]);
+  }
+  const double side = std::sqrt(squares / static_cast<double>(std::max<int64_t>(target_cells, 1)));
+  for (size_t i = 0; i < patches.size(); ++i) {
+    result.AddPatch(world, std::move(patches[i]), static_cast<float>(std::ldexp(side, doublings[i])));
+  }
   return result;
 }
 

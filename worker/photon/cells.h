@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "worker/trace/world.h"
@@ -8,15 +9,16 @@
 namespace bakewell {
 
 // The surface grid that photons are stored on. Triangles are grouped into patches: connected, facing within 35 degrees
-// of each other, projected to a plane of their own without folding over. A patch is cut into equal cells of about
-// cell_size_m a side that fill its bounding rectangle exactly; every cell knows the exact area of the surface inside
-// it. Cells exist for every triangle of the scene, lightmapped or not, and do not depend on anybody's UVs. Both sides
-// of a surface have flux of their own.
+// of each other, projected to a plane of their own without folding over. A patch is cut into equal cells of about its
+// cell_side_m that fill its bounding rectangle exactly; every cell knows the exact area of the surface inside it. Cells
+// exist for every triangle of the scene, lightmapped or not, and do not depend on anybody's UVs. Both sides of a
+// surface have flux of their own. Patches that texels seldom see, a plain around the level, have larger cells.
 struct CellPatch {
   Vec3f origin;  // [m]
   Vec3f t, b;    // cells per metre: x = (p - origin) . t, y = (p - origin) . b
   int32_t width = 0, height = 0;
   uint32_t first_cell = 0;  // cell (x, y) is first_cell + y * width + x
+  float cell_side_m = 1;
 };
 
 struct SurfaceCell {
@@ -27,10 +29,10 @@ struct SurfaceCell {
 
 class SurfaceCells {
  public:
-  // Chooses the cell size so that about `target_cells` cells hold surface.
-  static SurfaceCells Build(const World& world, int64_t target_cells);
+  // Chooses the cells' sizes so that about `target_cells` hold surface. seen[k]: how many of equally many rays from
+  // each texel met triangle k; without it all patches have cells of one size.
+  static SurfaceCells Build(const World& world, int64_t target_cells, std::span<const uint32_t> seen = {});
 
-  float cell_size_m() const { return cell_size_m_; }
   const std::vector<CellPatch>& patches() const { return patches_; }
   const std::vector<SurfaceCell>& cells() const { return cells_; }
   uint32_t PatchOf(uint32_t triangle) const { return patch_of_triangle_[triangle]; }
@@ -46,11 +48,8 @@ class SurfaceCells {
   }
 
  private:
-  void AddPatch(const World& world, std::vector<uint32_t> triangles);
-  bool MeasurePatch(const World& world, const std::vector<uint32_t>& triangles, CellPatch& patch,
-                    std::vector<SurfaceCell>& cells) const;
+  void AddPatch(const World& world, std::vector<uint32_t> triangles, float cell_side_m);
 
-  float cell_size_m_ = 1;
   double total_area_ = 0;
   std::vector<CellPatch> patches_;
   std::vector<SurfaceCell> cells_;

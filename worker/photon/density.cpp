@@ -23,7 +23,6 @@ class Estimator {
     cache_.irradiance.resize(map.flux.size());
     cache_.group.resize(map.flux.size());
     cache_.window.assign(map.flux.size(), 1);
-    cache_.cell_size_m = cells.cell_size_m();
     open_.assign(map.flux.size(), 0);
     cut_.assign(map.flux.size(), 0);
   }
@@ -92,7 +91,7 @@ class Estimator {
     const SurfaceCell& cell = cells_.cells()[i / 2];
     const Vec3f normal = side == 0 ? cell.normal : -cell.normal;
     const Vec3f step_x = patch.t / Dot(patch.t, patch.t), step_y = patch.b / Dot(patch.b, patch.b);
-    const Vec3f lift = normal * (kLift * cells_.cell_size_m());
+    const Vec3f lift = normal * (kLift * patch.cell_side_m);
     rays_ += static_cast<int64_t>(kSteps.size());
     for (size_t k = 0; k < kSteps.size(); ++k) {
       const int nx = x + kSteps[k][0], ny = y + kSteps[k][1];
@@ -109,7 +108,7 @@ class Estimator {
 
   Vec3f NeighbourCenter(const CellPatch& patch, int x, int y, int side) const {
     const SurfaceCell& cell = cells_.cells()[Index(patch, x, y, side) / 2];
-    return cell.position + (side == 0 ? cell.normal : -cell.normal) * (kLift * cells_.cell_size_m());
+    return cell.position + (side == 0 ? cell.normal : -cell.normal) * (kLift * patch.cell_side_m);
   }
 
   // A hit on the patch's own surface (a curved one) does not cut.
@@ -182,7 +181,7 @@ class Estimator {
     if (!cut_[i] && open_[i] != 0) {
       const Sum widest = Flood(patch, x, y, side, options_.max_radius);
       const double per_area = static_cast<double>(widest.count) / widest.area;
-      const double cell_area = static_cast<double>(cells_.cell_size_m()) * static_cast<double>(cells_.cell_size_m());
+      const double cell_area = static_cast<double>(patch.cell_side_m) * static_cast<double>(patch.cell_side_m);
       while (radius < options_.max_radius &&
              per_area * cell_area * (2 * radius + 1) * (2 * radius + 1) < options_.target_count)
         ++radius;

@@ -111,14 +111,16 @@ EmissionGuide::Start EmissionGuide::StartOf(int walk, size_t texels, uint32_t se
   return {std::min(texels - 1, static_cast<size_t>(random(0) * static_cast<float>(texels))), {random(1), random(2)}};
 }
 
-bool EmissionGuide::Walks(const LightSet& lights) {
-  return !lights.directionals().empty() || lights.environment().bright();
+int EmissionGuide::WalksFor(const LightSet& lights, int64_t photons) {
+  // Without sun and sky they have little to find out.
+  const bool distant = !lights.directionals().empty() || lights.environment().bright();
+  return static_cast<int>(std::min<int64_t>(photons / 16, distant ? 100'000 : 20'000));
 }
 
 EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, const AtlasLayout& layout,
                                    const TexelMap& map, int walks, uint32_t seed) {
   std::vector<TexelPoint> starts;
-  for (int walk = 0; walk < walks && Walks(lights) && !map.texels.empty(); ++walk) {
+  for (int walk = 0; walk < walks && !map.texels.empty(); ++walk) {
     const Start start = StartOf(walk, map.texels.size(), seed);
     starts.push_back(TexelSampler(world, layout, map, map.texels[start.texel]).At(start.u));
   }
@@ -131,6 +133,7 @@ EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, s
   guide.sky_width_ = lights.environment().width();
   guide.sky_height_ = lights.environment().height();
   guide.sky_axes_ = SkyAxes(world, lights.environment().type());
+  guide.seen_.assign(world.triangles().size(), 0);
   Marks marks;
   marks.sun.assign(lights.directionals().size(), std::vector<float>(kSunGrid * kSunGrid, 0.0f));
   marks.sky.assign(static_cast<size_t>(kSkyColumns) * kSkyRows * kSkyGrid * kSkyGrid, 0.0f);
@@ -166,6 +169,7 @@ EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, s
         if (step > 0) mark_sky(at.position, dir);
         break;
       }
+      ++guide.seen_[hit.triangle];
       at = world.PointAt(hit);
       mark_sun(at, key);
       if (random(10 * step + 12) >= MaxComponent(world.AlbedoAt(hit))) break;

@@ -26,9 +26,9 @@ class EmissionGuide {
     Vec2f u;
   };
   static Start StartOf(int walk, size_t texels, uint32_t seed);
-  // False where no light needs a pilot.
-  static bool Walks(const LightSet& lights);
-  // starts[walk] is the point that StartOf(walk) means, if Walks(lights). Keyed by seed.
+  // Walks for a bake of `photons`.
+  static int WalksFor(const LightSet& lights, int64_t photons);
+  // starts[walk] is the point that StartOf(walk) means. Keyed by seed.
   static EmissionGuide Learn(const World& world, const LightSet& lights, std::span<const TexelPoint> starts,
                              uint32_t seed);
   // The same over texels that are all there. walks: number of pilot paths.
@@ -51,6 +51,8 @@ class EmissionGuide {
   // Share of the square's area (sun) or of the sky's flux that reaches what texels see, (0, 1].
   float UsefulSun(int directional) const { return sun_useful_[directional]; }
   float UsefulSky() const { return sky_useful_; }
+  // How many of the walks' rays met each triangle.
+  const std::vector<uint32_t>& seen() const { return seen_; }
 
  private:
   struct Marks;
@@ -70,6 +72,7 @@ class EmissionGuide {
   int sky_width_ = 1, sky_height_ = 1;
   Frame sky_axes_;  // n: up, t: azimuth 0
   float sky_useful_ = 1;
+  std::vector<uint32_t> seen_;
 };
 
 // The square of a sun's photons; it turns with the light's node.

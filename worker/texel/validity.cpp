@@ -9,19 +9,36 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kInsideShare = 0.9f;  // of back faces: the texel is inside as a whole, if nothing divides it
-constexpr int kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
+constexpr float kOutsideShare = 0.25f;  // of back faces: the texel is outside as a whole, if nothing divides it
+constexpr int kCrowdRays = 8, kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
 
-// Share of `count` cosine-weighted rays that meet a back face first.
+// Cosine-weighted rays from one place, and how many of them met a back face first.
+struct Backs {
+  int rays = 0, backs = 0;
+  float Share() const { return static_cast<float>(backs) / static_cast<float>(rays); }
+};
+void AddRays(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, int end,
+             Backs& seen, int& rays) {
+  for (; seen.rays < end; ++seen.rays, ++rays) {
+    const Vec3f dir = frame.ToWorld(CosineHemisphere(set.At(static_cast<uint32_t>(seen.rays)).Get2(0)));
+    seen.backs += MeetsBack(world, world.Intersect(RayFrom(from, dir, kInfinity, set.key()))) ? 1 : 0;
+  }
+}
+
 float BackShare(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, int count,
                 int& rays) {
-  int backs = 0;
-  for (int i = 0; i < count; ++i) {
-    const Vec3f dir = frame.ToWorld(CosineHemisphere(set.At(static_cast<uint32_t>(i)).Get2(0)));
-    backs += MeetsBack(world, world.Intersect(RayFrom(from, dir, kInfinity, set.key()))) ? 1 : 0;
+  Backs seen;
+  AddRays(world, from, frame, set, count, seen, rays);
+  return seen.Share();
+}
+
+// Whether more than half of kInsideRays meet a back face: `seen` goes on until that is certain.
+bool IsInside(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, Backs& seen,
+              int& rays) {
+  while (2 * seen.backs <= kInsideRays && 2 * (seen.rays - seen.backs) < kInsideRays) {
+    AddRays(world, from, frame, set, seen.rays + 1, seen, rays);
   }
-  rays += count;
-  return static_cast<float>(backs) / static_cast<float>(count);
+  return 2 * seen.backs > kInsideRays;
 }
 
 // The four directions along the surface in which a texel looks for walls.
@@ -29,9 +46,12 @@ std::array<Vec3f, 4> Tangents(const Frame& frame) { return {frame.t, -frame.t, f
 
 // Something within the texel's own reach: a wall that stands on it, a box that covers part of it.
 bool Crowded(const World& world, const TexelPoint& center, float radius, int& rays) {
-  for (const Vec3f dir : Tangents(center.frame)) {
-    ++rays;
+  const Frame& frame = center.frame;
+  for (const Vec3f dir : Tangents(frame)) {
+    const Vec3f between = NormalizeOrZero(dir + Cross(frame.n, dir));
+    rays += 2;
     if (world.Intersect(RayFrom(center.surface, dir, radius, 0))) return true;
+    if (world.Intersect(RayFrom(center.surface, between, radius, 0))) return true;
   }
   return false;
 }
@@ -42,12 +62,13 @@ uint16_t ProbeMask(const World& world, const TexelSampler& sampler, const SobolS
   for (int i = 0; i < kPlaces; ++i) {
     const Vec2f u{(static_cast<float>(i % 4) + 0.5f) / 4, (static_cast<float>(i / 4) + 0.5f) / 4};
     const TexelPoint point = sampler.At(u);
-    float share = BackShare(world, point.surface, point.frame, set, kPlaceRays, result.rays);
-    if (share > 0) share = BackShare(world, point.surface, point.frame, set, kInsideRays, result.rays);
-    backs += share;
+    Backs seen;
+    AddRays(world, point.surface, point.frame, set, kPlaceRays, seen, result.rays);
+    const bool inside = seen.backs > 0 && IsInside(world, point.surface, point.frame, set, seen, result.rays);
+    backs += seen.Share();
     const uint16_t bit = static_cast<uint16_t>(1U << sampler.BitAt(u));
     tested |= bit;
-    if (share <= 0.5f) valid |= bit;
+    if (!inside) valid |= bit;
   }
   result.backface_share = backs / kPlaces;
   if (valid == 0) return 0;
@@ -64,7 +85,8 @@ bool PushOut(const World& world, TexelSampler& sampler, const SobolSet& set, Tex
     if (!MeetsBack(world, hit)) continue;
     SurfacePoint moved = center.surface;
     moved.position += dir * (hit.t * 1.001f + 4 * moved.offset);
-    if (BackShare(world, moved, center.frame, set, kInsideRays, result.rays) > 0.5f) continue;
+    Backs seen;
+    if (IsInside(world, moved, center.frame, set, seen, result.rays)) continue;
     sampler.MoveTo(moved.position);
     return true;
   }
@@ -102,8 +124,9 @@ TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<floa
   result.backface_share =
       known_share ? *known_share : BackShare(world, center.surface, center.frame, set, kValidityFirstRays, result.rays);
   if (search == PartSearch::kNear) {
-    if (result.backface_share == 0) return Saving(4, result);
-    if (result.backface_share > kInsideShare && !Crowded(world, center, sampler.radius(), result.rays)) {
+    if (result.backface_share == 0) return Saving(kCrowdRays, result);
+    if (!Crowded(world, center, sampler.radius(), result.rays)) {
+      if (result.backface_share <= kOutsideShare) return Saving(kPlaces * kPlaceRays, result);
       return ProbeWhole(world, sampler, set, result);
     }
   } else if (result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) {

@@ -124,6 +124,42 @@ TEST(SmoothGrid, NothingPassesWhereTexelsAreNotConnected) {
   }
 }
 
+TEST(SmoothGrid, SquareWindowsAreWhatTheSearchFinds) {
+  // Walls and holes at random; MeasureRoom only tells the search where it may be left out.
+  SmoothGrid searched(kSide, kSide);
+  TestRandom random(7);
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      SmoothCell& cell = searched.At(x, y);
+      cell.value = random.Unit();
+      cell.variance = random.Unit();
+      cell.known = random.Unit() < 0.97f;
+      for (int k = 0; k < 4; ++k) {
+        if (random.Unit() < 0.999f && (x / 20 == (x + kNeighbours[static_cast<size_t>(k)][0]) / 20))
+          searched.Connect(x, y, k);
+      }
+    }
+  }
+  SmoothGrid measured = searched;
+  measured.MeasureRoom();
+  int squares = 0;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      if (!searched.At(x, y).known) continue;
+      squares += measured.At(x, y).room >= 3 ? 1 : 0;
+      const SmoothGrid::Window a = searched.WindowOf(x, y, 6.5f), b = measured.WindowOf(x, y, 6.5f);
+      EXPECT_EQ(a.radius, b.radius);
+      EXPECT_EQ(a.weight, b.weight) << x << " " << y;
+      SmoothGrid::Steps steps_a, steps_b;
+      const auto sa = searched.SmoothedAt(x, y, 6.5f, steps_a), sb = measured.SmoothedAt(x, y, 6.5f, steps_b);
+      EXPECT_NEAR(sa.value, sb.value, 1e-6f);
+      EXPECT_NEAR(sa.variance, sb.variance, 1e-6f);
+      EXPECT_NEAR(searched.Choose(x, y), measured.Choose(x, y), 1e-4f);
+    }
+  }
+  EXPECT_GT(squares, kSide * kSide / 8);
+}
+
 TEST(SmoothGrid, UnknownTexelsHaveNoWeightButCountAsIfTheyCame) {
   Page page([](int, int) { return 2.0f; }, 0.1f, 4);
   for (int y = 0; y < kSide; ++y) {

@@ -84,6 +84,31 @@ TEST(SurfaceCells, PatchesThatFoldOverThemselvesAreSplit) {
   }
 }
 
+TEST(SurfaceCells, APlainThatIsSeldomSeenHasLargeCells) {
+  // A room of 4 x 3 x 4 m and, around it, a plain of 400 x 400 m, which would take all cells.
+  SceneBuilder builder;
+  builder.AddRoom({0, 0, 0}, {4, 3, 4}, {.lightmapped = false});
+  builder.AddQuad({-200, -1, 200}, {400, 0, 0}, {0, 0, -400}, {.lightmapped = false});
+  const Scene scene = builder.Build();
+  const auto world = World::Build(scene, BackfaceMode::kReflect, 0.98f).value();
+  std::vector<uint32_t> seen(world->triangles().size(), 500);
+  const auto plain = static_cast<uint32_t>(seen.size() - 1);
+  seen[plain] = seen[plain - 1] = 20;
+  const SurfaceCells even = SurfaceCells::Build(*world, 4000), graded = SurfaceCells::Build(*world, 4000, seen);
+  const auto side = [](const SurfaceCells& cells, uint32_t k) { return cells.patches()[cells.PatchOf(k)].cell_side_m; };
+  EXPECT_GT(side(even, 0), 4);
+  EXPECT_LT(side(graded, 0), 0.5f);
+  EXPECT_GE(side(graded, plain), 32 * side(graded, 0));
+  EXPECT_NEAR(static_cast<double>(graded.cells().size()), 4000, 1000);
+  ExpectCellsHoldTheirPoints(*world, graded);
+  // A ray or two that go elsewhere change nothing.
+  seen[0] += 3;
+  seen[plain] -= 2;
+  const SurfaceCells again = SurfaceCells::Build(*world, 4000, seen);
+  EXPECT_EQ(side(again, 0), side(graded, 0));
+  EXPECT_EQ(side(again, plain), side(graded, plain));
+}
+
 TEST(SurfaceCells, HalfATurnNeedsNoSplitForFolding) {
   const Scene scene = Spiral(0.25);
   const auto world = World::Build(scene, BackfaceMode::kReflect, 0.98f).value();

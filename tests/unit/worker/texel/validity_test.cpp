@@ -84,6 +84,21 @@ TEST(ProbeValidity, NearSearchFindsTheSameWithFewerRays) {
   }
 }
 
+TEST(ProbeValidity, BackFacesInTheDistanceDivideNoTexel) {
+  // A wall half a room away turns its back to the floor: a fifth of each texel's rays meet it, and none is inside.
+  SceneBuilder builder({8, 8});
+  builder.AddQuad({0, 0, 0}, {8, 0, 0}, {0, 0, -8}, {.page = {0, 0, 8, 8}});
+  builder.AddQuad({8, 0, 0}, {0, 0, -8}, {0, 5, 0}, {.lightmapped = false});
+  const Scene scene = builder.Build();
+  const PreparedLevel prepared = PrepareInMemory(scene, {});
+  const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 4 + 4)]];
+  TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
+  const TexelValidity validity = ProbeValidity(*prepared.world, 1, 0.2f, PartSearch::kNear, sampler);
+  EXPECT_TRUE(validity.valid);
+  EXPECT_EQ(sampler.valid_mask(), 0xffff);
+  EXPECT_EQ(validity.rays, 8);
+}
+
 TEST(ProbeValidity, NothingHasABackWhereBackfacesPass) {
   const Probed probed = Probe(FloorWithBox(1, 6, 1, 6), 3, 3, BackfaceMode::kPass);
   EXPECT_TRUE(probed.validity.valid);
