@@ -7,7 +7,7 @@
 
 namespace bakewell {
 
-// Writes all channels as 32-bit floats, ZIP compressed, single part, top row first. The file appears whole or not at
+// Writes all channels as 32-bit floats, RLE compressed, single part, top row first. The file appears whole or not at
 // all (temporary name in the same folder, fsync, rename). Same bytes for the same image. kUnavailable when the disk
 // refuses.
 absl::Status WriteExr(const std::filesystem::path& path, const Image& image);

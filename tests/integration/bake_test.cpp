@@ -157,6 +157,7 @@ TEST(EmbeddedBake, CancelledBakeLeavesTheFolderAsItWas) {
   BakeSettings settings = SmallSettings();
   settings.quality = Quality::kHigh;
   settings.resolution = 256;
+  settings.photons = 1 << 20;  // the gather begins soon
   const auto start = std::chrono::steady_clock::now();
   EXPECT_EQ(Bake({kSample, dir.path() / "out", settings, 2}, progress).status().code(), absl::StatusCode::kCancelled);
   // The whole bake takes half a minute.

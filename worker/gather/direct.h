@@ -56,4 +56,9 @@ void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const T
                   const TileLights::Choice& choice, Distant distant, uint32_t key, uint32_t begin, uint32_t end,
                   Accumulator& sum, GatherCounters& counters);
 
+// Radiance that a gather ray `dir` of density `pdf` finds by itself, emission and sky, weighted against the samples of
+// GatherDirect. lights: none where no local light reaches.
+Rgb FoundByGather(const GatherScene& scene, const TileLights* lights, const TileLights::Choice& choice,
+                  const SurfacePoint& from, Vec3f dir, float pdf, const Hit& hit);
+
 }  // namespace bakewell

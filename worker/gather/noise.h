@@ -13,6 +13,9 @@ namespace bakewell {
 // ones did.
 class SetNoise {
  public:
+  // In Correction: a tile's texels tell how the doublings fall only so well, and errors are to err on the safe side.
+  static constexpr double kMargin = 1.2;
+
   // A set whose errors are measured in `unit` [W m^-2]; above zero, else it does not count.
   void Add(const Accumulator& set, float unit) {
     if (!(unit > 0)) return;
@@ -20,13 +23,14 @@ class SetNoise {
     const std::array<double, 3> halvings = set.Halvings();
     for (size_t k = 0; k < halving_.size(); ++k) halving_[k] += halvings[k] * weight;
     variance_ += static_cast<double>(Luminance(set.Variance())) * weight;
+    ++sets_;
   }
+  size_t sets() const { return sets_; }
 
   // For Accumulator::Variance, in [0.1, 1].
   float Correction() const {
     if (!(variance_ > 0) || !(halving_[2] > 0)) return 1;
     constexpr double kLeastFall = 0.1, kMostFall = 0.5, kLeast = 0.1;  // 1/2 for independent samples
-    constexpr double kMargin = 1.2;  // a tile's texels tell the falls only so well: errors err on the safe side
     const double fall = std::clamp(std::sqrt(halving_[0] / halving_[2]), kLeastFall, kMostFall);
     return static_cast<float>(std::clamp(kMargin * halving_[0] * fall / (1 - fall) / variance_, kLeast, 1.0));
   }
@@ -34,6 +38,7 @@ class SetNoise {
  private:
   std::array<double, 3> halving_{};
   double variance_ = 0;
+  size_t sets_ = 0;
 };
 
 }  // namespace bakewell

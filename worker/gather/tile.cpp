@@ -6,11 +6,11 @@
 #include <optional>
 
 #include "worker/filter/smooth_tile.h"
+#include "worker/gather/allot.h"
 #include "worker/gather/direct.h"
 #include "worker/gather/guide.h"
 #include "worker/gather/noise.h"
 #include "worker/gather/skip.h"
-#include "worker/sample/mis.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
 #include "worker/texel/validity.h"
@@ -19,26 +19,13 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kCulledShare = 0.1f;  // of the target error of the tile's dimmest texel
-constexpr uint32_t kAuditSamples = 64;
-constexpr int64_t kWorthLeavingOut = 64;  // texels; fewer cost less than the audit
-
-// Light that a gather ray finds by itself: emission and sky, weighted against the explicit samples of GatherDirect.
-Rgb FoundByGather(const GatherScene& scene, const std::optional<TileLights>& lights, const TileLights::Choice& choice,
-                  const SurfacePoint& from, Vec3f dir, float pdf, const Hit& hit) {
-  if (!hit) {
-    const EnvironmentLight& sky = scene.lights.environment();
-    if (!sky.bright()) return {};
-    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : PowerHeuristic(pdf, sky.Pdf(dir)));
-  }
-  const int light = scene.lights.LightOfTriangle(hit.triangle);
-  if (light < 0) return {};
-  const Rgb emission = scene.world.EmissionAt(hit);
-  if (MaxComponent(emission) <= 0) return {};
-  const float chosen = lights ? lights->Probability(choice, from, light) : 0;
-  const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from.position, dir, hit.t) : 0;
-  return emission * PowerHeuristic(pdf, light_pdf);
-}
+constexpr float kCulledShare = 0.1f;   // of the target error of the tile's dimmest texel
+constexpr uint32_t kAuditSamples = 4;  // of suns and sky, a texel
+constexpr float kGatherCost = 2.5f;    // of a gather ray and what it meets, over a light sample
+constexpr float kBoundless = 1e30f;    // error of what tolerates none
+constexpr float kMargin = static_cast<float>(SetNoise::kMargin);  // what is reported is safe, what stops is likely
+constexpr size_t kTellingSets = 32;                               // fewer sets of a tile say little about all
+constexpr int64_t kWorthLeavingOut = 64;                          // texels; fewer cost less than the audit
 
 // Everything about one texel while its tile is in flight.
 struct Work {
@@ -52,7 +39,8 @@ struct Work {
   uint8_t open = 0;
   float direct_correction = 1, indirect_correction = 1;  // of the accumulators' variances
   float backs = 0, backface_share = 0;                   // gather rays that met a back face; their share
-  bool direct_active = true, indirect_active = true;
+  bool has_direct = true, has_indirect = true;           // there is something to sample
+  bool direct_active = false, indirect_active = false;   // in the next round
   Accumulator direct{}, indirect{};
   std::optional<GatherGuide> guide{};          // of gather rays, after the first round
   std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
@@ -73,11 +61,14 @@ class TileGatherer {
     Prepare(layout);
     if (!FirstRound()) return std::nullopt;
     if (options_.filter) Connect();
+    for (Work& work : work_) {
+      work.direct_active = work.has_direct;
+      work.indirect_active = work.has_indirect;
+    }
     CorrectVariances();
     Decide();
     Guide();
-    for (int done = options_.min_samples; done < options_.max_samples; done *= 2) {
-      if (!Round(static_cast<uint32_t>(done), static_cast<uint32_t>(2 * done))) break;
+    while (Round()) {
       CorrectVariances();
       Decide();
     }
@@ -97,7 +88,7 @@ class TileGatherer {
     }
     if (lit_ ? Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) LeaveOutDark();
     for (size_t i = 0; i < work_.size(); ++i) {
-      if (work_[i].direct_active) ChooseLights(map_.texels[begin_ + i], work_[i].sampler.radius(), work_[i]);
+      if (work_[i].has_direct) ChooseLights(map_.texels[begin_ + i], work_[i].sampler.radius(), work_[i]);
     }
   }
 
@@ -111,7 +102,7 @@ class TileGatherer {
       lights_.emplace(scene_, map_, begin_, end_, tile_key, dispensable, counters_);
     }
     work.choice = lights_->ForTexel(texel, radius);
-    work.direct_active = !work.choice.empty || scene_.lights.samples_distant();
+    work.has_direct = !work.choice.empty || scene_.lights.samples_distant();
   }
 
   bool Skips(Skip skip) const { return !options_.no_skip.Has(skip); }
@@ -125,8 +116,14 @@ class TileGatherer {
     for (size_t i = 0; i < work_.size(); ++i) {
       work_[i].dark = dark[i];
       work_[i].audited = lit_ && audited[i];
-      if (dark[i] && !work_[i].audited) work_[i].direct_active = work_[i].indirect_active = false;
+      if (dark[i] && !work_[i].audited) work_[i].has_direct = work_[i].has_indirect = false;
     }
+  }
+
+  std::vector<bool> Valid() const {
+    std::vector<bool> valid;
+    for (const Work& work : work_) valid.push_back(work.valid);
+    return valid;
   }
 
   std::vector<uint32_t> Keys() const {
@@ -151,7 +148,7 @@ class TileGatherer {
     std::vector<int64_t> rays;
     for (size_t i = 0; i < work_.size(); ++i) {
       rays.push_back(-counters_.light_rays());
-      if (work_[i].indirect_active) IndirectRound(work_[i], 0, samples);
+      if (work_[i].has_indirect) IndirectRound(work_[i], 0, samples);
       Validate(map_.texels[begin_ + i], work_[i]);
       rays.back() += counters_.light_rays();
     }
@@ -159,7 +156,7 @@ class TileGatherer {
     for (size_t i = 0; i < work_.size(); ++i) {
       Work& work = work_[i];
       rays[i] -= counters_.light_rays();
-      if (work.direct_active) DirectRound(work, 0, samples);
+      if (work.has_direct) DirectRound(work, 0, samples);
       rays[i] += counters_.light_rays();
       const float found = Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance());
       if (work.audited && work.valid) audit.Found(found, options_.mean_irradiance, rays[i]);
@@ -177,23 +174,19 @@ class TileGatherer {
         {dark, std::ssize(work_), std::max<int64_t>(0, full - dark * kValidityFirstRays)});
   }
 
-  // Suns and sky, where no gather ray of the tile escaped and more samples of a few texels see none of them.
+  // Suns and sky, where no gather ray of the tile escaped and a few samples of every texel see none of them.
   void LeaveOutSky() {
     if (!scene_.lights.samples_distant()) return;
-    std::vector<bool> looking;
-    for (const Work& work : work_) looking.push_back(work.direct_active);
-    const int64_t texels = std::count(looking.begin(), looking.end(), true);
+    const int64_t texels = std::count_if(work_.begin(), work_.end(), [](const Work& work) { return work.has_direct; });
     counters_.skip[Skip::kUnseenSky].of += texels;
     if (escaped_ > 0 || texels < kWorthLeavingOut) return;
-    const std::vector<bool> audited = DrawAudit(Keys(), looking);
     SkipAudit audit;
-    for (size_t i = 0; i < work_.size(); ++i) {
-      if (!audited[i]) continue;
+    for (const Work& work : work_) {
+      if (!work.has_direct) continue;
       Accumulator lost;
-      GatherDirect(scene_, work_[i].sampler, *lights_, {}, Distant::kSampled, HashCombine(work_[i].key, 0x5c1u), 0,
+      GatherDirect(scene_, work.sampler, *lights_, {}, Distant::kSampled, HashCombine(work.key, 0x5c1u), 0,
                    kAuditSamples, lost, counters_);
-      const float found = Luminance(lost.Irradiance());
-      audit.Found(found, options_.mean_irradiance, 0);
+      audit.Found(Luminance(lost.Irradiance()), options_.mean_irradiance, 0);
     }
     audit.Count(counters_.skip);
     if (!audit.passes()) return;
@@ -216,17 +209,17 @@ class TileGatherer {
     found_.reset();
   }
 
-  // Samples [done, planned) of every active texel. False when none was active.
-  bool Round(uint32_t done, uint32_t planned) {
+  // Doubles the samples of whatever is active. False when nothing was.
+  bool Round() {
     bool any = false;
-    for (Work& work : work_) any |= RoundOf(work, done, planned);
+    for (Work& work : work_) {
+      const auto direct = static_cast<uint32_t>(work.direct_samples),
+                 indirect = static_cast<uint32_t>(work.indirect_samples);
+      if (work.direct_active) DirectRound(work, direct, 2 * direct);
+      if (work.indirect_active) IndirectRound(work, indirect, 2 * indirect);
+      any = any || work.direct_active || work.indirect_active;
+    }
     return any;
-  }
-
-  bool RoundOf(Work& work, uint32_t done, uint32_t planned) {
-    if (work.direct_active) DirectRound(work, done, planned);
-    if (work.indirect_active) IndirectRound(work, done, planned);
-    return work.direct_active || work.indirect_active;
   }
 
   void DirectRound(Work& work, uint32_t done, uint32_t planned) {
@@ -255,7 +248,7 @@ class TileGatherer {
     counters_.skip[Skip::kInvalidTexels].Add({validity.rays_saved > 0 ? 1 : 0, 1, validity.rays_saved});
     work.valid = validity.valid;
     work.backface_share = validity.backface_share;
-    if (!work.valid) work.direct_active = work.indirect_active = false;
+    if (!work.valid) work.has_direct = work.has_indirect = false;
     if (work.valid && !validity.pushed_out && work.sampler.valid_mask() == 0xffff) return;
     work.indirect = {};
     work.group = {};
@@ -263,10 +256,10 @@ class TileGatherer {
     // A texel that was pushed out lies up to its diagonal away, where other light comes.
     if (validity.pushed_out) {
       work.dark = work.audited = false;
-      work.indirect_active = true;
+      work.has_indirect = true;
       ChooseLights(texel, 3 * work.sampler.radius(), work);
     }
-    if (work.indirect_active) IndirectRound(work, 0, static_cast<uint32_t>(options_.min_samples));
+    if (work.has_indirect) IndirectRound(work, 0, static_cast<uint32_t>(options_.min_samples));
   }
 
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
@@ -285,7 +278,7 @@ class TileGatherer {
       const Hit hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, ray_key));
       work.backs += MeetsBack(scene_.world, hit) ? 1.0f : 0.0f;
       escaped_ += hit ? 0 : 1;
-      Rgb radiance = FoundByGather(scene_, lights_, work.choice, point.surface, dir, pdf, hit);
+      Rgb radiance = FoundByGather(scene_, lights_ ? &*lights_ : nullptr, work.choice, point.surface, dir, pdf, hit);
       if (hit) {
         const GatheredRadiance reflected = ReflectedRadiance(scene_, hit, ray_key, counters_);
         radiance += reflected.radiance;
@@ -305,40 +298,18 @@ class TileGatherer {
     }
   }
 
-  // Variance (luminance) averaged over the texel and those of its eight neighbours that share its chart and tile.
-  template <typename Of>
-  float PooledVariance(size_t i, Of of) const {
-    const Texel& texel = map_.texels[begin_ + i];
-    const PageSize page = map_.pages[texel.page];
-    float sum = 0;
-    int count = 0;
-    for (int y = std::max(0, texel.y - 1); y <= std::min(page.height - 1, texel.y + 1); ++y) {
-      for (int x = std::max(0, texel.x - 1); x <= std::min(page.width - 1, texel.x + 1); ++x) {
-        const size_t at = static_cast<size_t>(y) * static_cast<size_t>(page.width) + static_cast<size_t>(x);
-        const int64_t j = int64_t{map_.texel_at[texel.page][at]} - begin_;
-        if (j < 0 || j >= static_cast<int64_t>(work_.size()) || !work_[j].valid) continue;
-        if (map_.texels[begin_ + static_cast<size_t>(j)].chart != texel.chart) continue;
-        sum += Luminance(of(work_[j]));
-        ++count;
-      }
-    }
-    return count > 0 ? sum / static_cast<float>(count) : 0;
-  }
-
   // Which of its neighbours each texel is connected to, on the grid and for the page's filter.
   void Connect() {
-    std::vector<bool> valid;
-    for (const Work& work : work_) valid.push_back(work.valid);
     const std::vector<uint8_t> open =
-        smooth_.emplace(map_, begin_, end_).Connect(scene_.world, valid, counters_.filter_rays);
+        smooth_.emplace(map_, begin_, end_).Connect(scene_.world, Valid(), counters_.filter_rays);
     for (size_t i = 0; i < work_.size(); ++i) work_[i].open = open[i];
   }
 
   // Every texel's indirect luminance and its variance after filtering, as far as this tile can tell.
-  std::vector<SmoothGrid::Smoothed> SmoothIndirect() {
+  std::vector<SmoothGrid::Smoothed> SmoothIndirect(const std::vector<float>& variance) {
     for (size_t i = 0; i < work_.size(); ++i) {
       const Work& work = work_[i];
-      if (work.valid) smooth_->Put(i, Luminance(work.indirect.Irradiance()), Luminance(work.IndirectVariance()));
+      if (work.valid) smooth_->Put(i, Luminance(work.indirect.Irradiance()), variance[i]);
     }
     return smooth_->Smooth();
   }
@@ -352,32 +323,49 @@ class TileGatherer {
       if (work.indirect_active) indirect.Add(work.indirect, Weighing(Luminance(work.indirect.Irradiance())));
     }
     for (Work& work : work_) {
-      if (work.direct_active) work.direct_correction = direct.Correction();
-      if (work.indirect_active) work.indirect_correction = indirect.Correction();
+      if (work.direct_active && direct.sets() >= kTellingSets) work.direct_correction = direct.Correction();
+      if (work.indirect_active && indirect.sets() >= kTellingSets) work.indirect_correction = indirect.Correction();
     }
   }
 
-  // Switches off the estimators that meet their half of the target.
+  // Who takes part in the next round.
   void Decide() {
-    if (options_.target_error <= 0) return;
-    std::vector<std::array<bool, 2>> active(work_.size());
+    std::vector<float> direct, indirect;
+    for (const Work& work : work_) {
+      direct.push_back(Luminance(work.DirectVariance()));
+      indirect.push_back(Luminance(work.IndirectVariance()));
+    }
     std::vector<SmoothGrid::Smoothed> smooth;
-    if (options_.filter) smooth = SmoothIndirect();
+    if (options_.filter && options_.target_error > 0) smooth = SmoothIndirect(indirect);
+    const std::vector<bool> valid = Valid();
+    direct = MeanOverNeighbours(map_, begin_, direct, valid);
+    indirect = MeanOverNeighbours(map_, begin_, indirect, valid);
+    std::vector<Claim> claims;
+    size_t texels = 0;
     for (size_t i = 0; i < work_.size(); ++i) {
       const Work& work = work_[i];
-      if (!work.valid) continue;
+      texels += work.valid ? 1 : 0;
+      claims.push_back(
+          {0, static_cast<float>(work.direct_samples), work.has_direct && work.direct_samples < options_.max_samples});
+      claims.push_back({0, kGatherCost * static_cast<float>(work.indirect_samples),
+                        work.has_indirect && work.indirect_samples < options_.max_samples});
+      if (options_.target_error <= 0) continue;
       // A stray sample must not raise its own tolerance: the smoothed light judges where there is one.
-      const float indirect = options_.filter ? smooth[i].value : Luminance(work.indirect.Irradiance());
-      const float irradiance = Luminance(work.direct.Irradiance()) + indirect;
-      const float scale = Tolerated(irradiance);
-      const float budget = 0.5f * scale * scale;
-      active[i] = {work.direct_active && PooledVariance(i, [](const Work& w) { return w.DirectVariance(); }) > budget,
-                   work.indirect_active && (!options_.filter || smooth[i].variance > budget) &&
-                       PooledVariance(i, [](const Work& w) { return w.IndirectVariance(); }) > budget};
+      const float gathered = options_.filter ? smooth[i].value : Luminance(work.indirect.Irradiance());
+      const float tolerated = Tolerated(Luminance(work.direct.Irradiance()) + gathered);
+      const auto error = [&](float variance) {
+        return variance > 0 ? std::min(variance / (kMargin * tolerated * tolerated), kBoundless) : 0;
+      };
+      if (work.has_direct) claims[2 * i].error = error(direct[i]);
+      const float left = options_.filter ? std::min(indirect[i], smooth[i].variance) : indirect[i];
+      if (work.has_indirect) claims[2 * i + 1].error = error(left);
     }
+    // Without a target everybody goes on.
+    std::vector<bool> granted =
+        options_.target_error > 0 ? Allot(claims, texels) : std::vector<bool>(claims.size(), true);
     for (size_t i = 0; i < work_.size(); ++i) {
-      work_[i].direct_active = active[i][0];
-      work_[i].indirect_active = active[i][1];
+      work_[i].direct_active = claims[2 * i].open && granted[2 * i];
+      work_[i].indirect_active = claims[2 * i + 1].open && granted[2 * i + 1];
     }
   }
 

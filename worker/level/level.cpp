@@ -19,11 +19,11 @@ QualityNumbers NumbersOf(Quality quality) {
     case Quality::kPreview:
       return {8, 256, 6, 0.08f};
     case Quality::kMedium:
-      return {16, 512, 24, 0.04f};
+      return {8, 512, 24, 0.04f};
     case Quality::kHigh:
       break;
   }
-  return {32, 4096, 256, 0.009f};
+  return {16, 4096, 256, 0.009f};
 }
 
 constexpr int64_t kLeastPhotons = 32768;

@@ -1,0 +1,68 @@
+#include "worker/gather/allot.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/support/statistics.h"
+
+namespace bakewell {
+namespace {
+
+double Sum(std::span<const Claim> claims) {
+  double sum = 0;
+  for (const Claim& claim : claims) sum += static_cast<double>(claim.error);
+  return sum;
+}
+
+TEST(Allot, GrantsNothingWhereAllTogetherIsEnough) {
+  // A penumbra above what is tolerated, on a plain that has less than it may.
+  std::vector<Claim> claims(100, {0.2f, 8, true});
+  claims[7].error = 3;
+  EXPECT_EQ(Allot(claims, 100), std::vector<bool>(100, false));
+}
+
+TEST(Allot, NobodyStaysFarAboveWhatIsTolerated) {
+  std::vector<Claim> claims(100, {0.1f, 8, true});
+  claims[7].error = 1.01f * kWorst * kWorst;
+  const std::vector<bool> granted = Allot(claims, 100);
+  EXPECT_EQ(std::count(granted.begin(), granted.end(), true), 1);
+  EXPECT_TRUE(granted[7]);
+}
+
+TEST(Allot, TheGreatestGainForItsCostComesFirst) {
+  const std::vector<Claim> claims = {{2, 64, true}, {2, 8, true}, {1, 8, true}, {3, 8, false}};
+  // 8 in all; 6.65 is the aim of 7: two doublings that bring 1 and 0.5.
+  EXPECT_EQ(Allot(claims, 7), (std::vector<bool>{false, true, true, false}));
+}
+
+// Doubling by doubling towards a sum of errors costs at most half more than the least cost there is, sqrt(error x cost)
+// shared out without whole doublings (Neyman), and ends.
+TEST(Allot, CostsLittleMoreThanTheOptimum) {
+  TestRandom random(3);
+  std::vector<Claim> claims;
+  for (int i = 0; i < 1000; ++i) claims.push_back({std::exp(4 * random.Unit() - 3), 8, true});
+  const double floor_cost = 8 * 1000, budget = 0.1 * Sum(claims);
+  double roots = 0;
+  for (const Claim& claim : claims) roots += std::sqrt(static_cast<double>(claim.error) * 8);
+  int rounds = 0;
+  for (; Sum(claims) > budget; ++rounds) {
+    // Errors in units in which 1 is tolerated: the budget is that of `budget` texels.
+    const std::vector<bool> granted = Allot(claims, static_cast<size_t>(budget));
+    ASSERT_NE(std::count(granted.begin(), granted.end(), true), 0);
+    for (size_t i = 0; i < claims.size(); ++i) {
+      if (!granted[i]) continue;
+      claims[i].error /= 2;
+      claims[i].cost *= 2;
+    }
+  }
+  double cost = 0;
+  for (const Claim& claim : claims) cost += static_cast<double>(claim.cost);
+  EXPECT_GT(cost, floor_cost);
+  EXPECT_LT(cost, 1.5 * roots * roots / budget);
+  EXPECT_LT(rounds, 20);
+}
+
+}  // namespace
+}  // namespace bakewell
