@@ -1,5 +1,7 @@
 #include "worker/finish/page.h"
 
+#include "worker/finish/ringing.h"
+
 namespace bakewell {
 namespace {
 
@@ -69,10 +71,11 @@ class Filler {
 };
 
 void PutTexel(const Texel& texel, const TexelLight& light, PageImages& images) {
+  const RadianceSh sh = Windowed(light.sh, WindowStrength(light.sh));
   for (int c = 0; c < 3; ++c) {
     images.irradiance.At(c, texel.x, texel.y) = light.irradiance[c];
     images.variance.At(c, texel.x, texel.y) = light.variance[c];
-    for (int i = 0; i < kShCoefficients; ++i) images.sh.At(3 * i + c, texel.x, texel.y) = light.sh.lambda[i][c];
+    for (int i = 0; i < kShCoefficients; ++i) images.sh.At(3 * i + c, texel.x, texel.y) = sh.lambda[i][c];
   }
   images.irradiance.At(3, texel.x, texel.y) = std::min(texel.coverage, 1.0f);
   images.variance.At(3, texel.x, texel.y) = light.backface_share;

@@ -330,43 +330,51 @@ class TileGatherer {
 
   // Who takes part in the next round.
   void Decide() {
-    std::vector<float> direct, indirect;
+    std::vector<float> direct, indirect, light;
     for (const Work& work : work_) {
       direct.push_back(Luminance(work.DirectVariance()));
       indirect.push_back(Luminance(work.IndirectVariance()));
+      light.push_back(Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance()));
     }
-    std::vector<SmoothGrid::Smoothed> smooth;
-    if (options_.filter && options_.target_error > 0) smooth = SmoothIndirect(indirect);
-    const std::vector<bool> valid = Valid();
-    direct = MeanOverNeighbours(map_, begin_, direct, valid);
-    indirect = MeanOverNeighbours(map_, begin_, indirect, valid);
+    const auto pooled = [this, valid = Valid()](const std::vector<float>& values) {
+      return MeanOverNeighbours(map_, begin_, values, valid);
+    };
+    const std::vector<float> pooled_direct = pooled(direct);
+    std::vector<float> pooled_indirect = pooled(indirect);
+    // A stray sample must not raise its own tolerance: neighbours or the smoothed light judge.
+    if (!Grant(pooled_direct, pooled_indirect, pooled(light)) || !options_.filter || options_.target_error <= 0) return;
+    const std::vector<SmoothGrid::Smoothed> smooth = SmoothIndirect(indirect);
+    for (size_t i = 0; i < work_.size(); ++i) {
+      pooled_indirect[i] = std::min(pooled_indirect[i], smooth[i].variance);
+      light[i] = Luminance(work_[i].direct.Irradiance()) + smooth[i].value;
+    }
+    Grant(pooled_direct, pooled_indirect, light);
+  }
+
+  // Makes active who gets more samples, by variances and irradiance a texel; without a target everybody. False: nobody.
+  bool Grant(const std::vector<float>& direct, const std::vector<float>& indirect, const std::vector<float>& light) {
     std::vector<Claim> claims;
     size_t texels = 0;
     for (size_t i = 0; i < work_.size(); ++i) {
       const Work& work = work_[i];
       texels += work.valid ? 1 : 0;
-      claims.push_back(
-          {0, static_cast<float>(work.direct_samples), work.has_direct && work.direct_samples < options_.max_samples});
-      claims.push_back({0, kGatherCost * static_cast<float>(work.indirect_samples),
-                        work.has_indirect && work.indirect_samples < options_.max_samples});
-      if (options_.target_error <= 0) continue;
-      // A stray sample must not raise its own tolerance: the smoothed light judges where there is one.
-      const float gathered = options_.filter ? smooth[i].value : Luminance(work.indirect.Irradiance());
-      const float tolerated = Tolerated(Luminance(work.direct.Irradiance()) + gathered);
-      const auto error = [&](float variance) {
-        return variance > 0 ? std::min(variance / (kMargin * tolerated * tolerated), kBoundless) : 0;
+      const float tolerated = Tolerated(light[i]);
+      const auto claim = [&](bool has, int samples, float cost, float variance) {
+        const float error = variance > 0 ? std::min(variance / (kMargin * tolerated * tolerated), kBoundless) : 0;
+        claims.push_back({has ? error : 0, cost * static_cast<float>(samples), has && samples < options_.max_samples});
       };
-      if (work.has_direct) claims[2 * i].error = error(direct[i]);
-      const float left = options_.filter ? std::min(indirect[i], smooth[i].variance) : indirect[i];
-      if (work.has_indirect) claims[2 * i + 1].error = error(left);
+      claim(work.has_direct, work.direct_samples, 1, direct[i]);
+      claim(work.has_indirect, work.indirect_samples, kGatherCost, indirect[i]);
     }
-    // Without a target everybody goes on.
-    std::vector<bool> granted =
+    const std::vector<bool> granted =
         options_.target_error > 0 ? Allot(claims, texels) : std::vector<bool>(claims.size(), true);
+    bool any = false;
     for (size_t i = 0; i < work_.size(); ++i) {
       work_[i].direct_active = claims[2 * i].open && granted[2 * i];
       work_[i].indirect_active = claims[2 * i + 1].open && granted[2 * i + 1];
+      any = any || work_[i].direct_active || work_[i].indirect_active;
     }
+    return any;
   }
 
   // Variance of the texel's irradiance that comes from the finite number of photons.
