@@ -23,7 +23,7 @@ QualityNumbers NumbersOf(Quality quality) {
     case Quality::kHigh:
       break;
   }
-  return {16, 4096, 256, 0.009f};
+  return {16, 16384, 512, 0.0065f};  // sampling and photons together: 1 %
 }
 
 constexpr int64_t kLeastPhotons = 32768;

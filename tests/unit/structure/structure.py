@@ -24,7 +24,7 @@ ALLOWED_LIBRARIES = {
     r"embree\d/": ("worker/trace",),
     r"tbb/|oneapi/": ("worker", "server", "client/local"),  # threads, as the standard library's
     r"OpenMesh/": ("server/chart",),
-    r"Eigen/": ("server/chart",),
+    r"Eigen/": ("server/chart", "worker/finish"),  # linear algebra
     r"sqlite3|SQLiteCpp/": ("server/store",),
     r"httplib": ("server/http",),
     r"grpc": ("proto/rpc", "server/rpc", "worker/rpc", "client/rpc", "client/local"),
