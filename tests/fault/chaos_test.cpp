@@ -125,11 +125,25 @@ TEST_F(Chaos, JobSurvivesKillsCutsAndRotWithTheSameBytes) {
   const auto again = Client()->Submit(scene.Text(), {"chaos", "chaos", "", false});
   EXPECT_EQ(again->job_id(), submitted->job_id());
   EXPECT_TRUE(WaitFor([&] { return Client()->Status()->leases() == 0; }));
-  for (size_t i = 0; i < workers_.size(); ++i) workers_[i]->Signal(SIGTERM);
-  for (size_t i = 0; i < workers_.size(); ++i) workers_[i]->Wait(seconds(10));
+  workers_[3]->Kill();  // which hangs, unless it was killed before
+  for (size_t i = 0; i < 3; ++i) workers_[i]->Signal(SIGTERM);
+  for (size_t i = 0; i < 3; ++i) EXPECT_EQ(workers_[i]->Wait(seconds(10)), 0) << i;
   EXPECT_TRUE(WaitFor([&] { return Client()->Status()->workers() == 0; }, seconds(10)));
   std::printf("chaos: %d kills, %d connections through the proxy, %lld tasks\n", done_kills, proxy_->connections(),
               static_cast<long long>(job->tasks_total()));
+}
+
+// Symptom: a worker whose task does not listen left the farm after its grace, and its process stayed.
+TEST_F(Chaos, SigtermEndsAWorkerWhoseTaskHangs) {
+  StartServer();
+  Process hung({SYNTHETIC_WORKER, "--server", absl::StrCat("localhost:", port_), "--name", "hung", "--grace", "0.5"},
+               (dir_.path() / "hung.log").string(), {{"BAKEWELL_TEST_FAULT", "hang"}});
+  const auto submitted = Client()->Submit(SyntheticScene().Text(), {"hang", "", "", false});
+  ASSERT_TRUE(submitted.ok()) << submitted.status();
+  ASSERT_TRUE(WaitFor([&] { return Client()->Status()->leases() > 0; }));
+  hung.Signal(SIGTERM);
+  EXPECT_EQ(hung.Wait(seconds(10)), 0);
+  EXPECT_EQ(Client()->Status()->leases(), 0);
 }
 
 TEST_F(Chaos, SigtermEndsTheServerAndTheJobGoesOnAfterwards) {
