@@ -19,7 +19,7 @@ using std::chrono::microseconds;
 
 // Measured costs on one core of the build machine (tests/bench has the machine); the
 // scheduler corrects them by what it sees.
-constexpr double kPhotonUs = 4;
+constexpr double kPhotonUs = 1;
 constexpr double kSampleUs = 2.5;
 constexpr double kFinishUs = 500'000;
 constexpr double kReportUs = 20'000;
