@@ -63,10 +63,7 @@ fs::path BlobStore::PathOf(const Digest& digest) const {
 
 absl::StatusOr<std::unique_ptr<BlobStore::Upload>> BlobStore::StartUpload(const Digest& digest, int64_t size_bytes) {
   if (size_bytes < 0) return absl::InvalidArgumentError("store: negative blob size");
-  if (quota_bytes_ > 0 && total_bytes() + size_bytes > quota_bytes_) {
-    return absl::ResourceExhaustedError(absl::StrCat("store: ", total_bytes(), " of ", quota_bytes_,
-                                                     " bytes used, a blob of ", size_bytes, " does not fit"));
-  }
+  BAKEWELL_RETURN_IF_ERROR(CheckQuota(size_bytes));
   std::unique_ptr<Upload> upload(new Upload(*this, digest, size_bytes));
   upload->path_ = root_ / "incoming" / absl::StrCat(next_name_.fetch_add(1));
   upload->file_ = open(upload->path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
@@ -74,7 +71,15 @@ absl::StatusOr<std::unique_ptr<BlobStore::Upload>> BlobStore::StartUpload(const 
   return upload;
 }
 
+absl::Status BlobStore::CheckQuota(int64_t more_bytes) const {
+  const int64_t used = total_bytes() + incoming_bytes_.load(std::memory_order_relaxed);
+  if (quota_bytes_ == 0 || more_bytes <= quota_bytes_ - used) return absl::OkStatus();
+  return absl::ResourceExhaustedError(absl::StrCat("store: ", used, " of ", quota_bytes_, " bytes used, ", more_bytes,
+                                                   " more do not fit: collect garbage or raise the quota"));
+}
+
 BlobStore::Upload::~Upload() {
+  store_.incoming_bytes_ -= size_bytes_;
   if (file_ >= 0) close(file_);
   if (!path_.empty()) unlink(path_.c_str());
 }
@@ -84,6 +89,7 @@ absl::Status BlobStore::Upload::Append(std::string_view bytes) {
     return absl::InvalidArgumentError(
         absl::StrCat("blob ", digest_.Hex(), ": more than the declared ", declared_bytes_, " bytes"));
   }
+  BAKEWELL_RETURN_IF_ERROR(store_.CheckQuota(std::ssize(bytes)));
   hash_.Update(std::as_bytes(std::span(bytes)));
   for (size_t done = 0; done < bytes.size();) {
     const ssize_t wrote = write(file_, bytes.data() + done, bytes.size() - done);
@@ -91,7 +97,8 @@ absl::Status BlobStore::Upload::Append(std::string_view bytes) {
     if (wrote < 0) return FromErrno(errno, absl::StrCat("writing blob ", digest_.Hex()));
     done += static_cast<size_t>(wrote);
   }
-  size_bytes_ += static_cast<int64_t>(bytes.size());
+  size_bytes_ += std::ssize(bytes);
+  store_.incoming_bytes_ += std::ssize(bytes);
   return absl::OkStatus();
 }
 

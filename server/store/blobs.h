@@ -53,6 +53,7 @@ class BlobStore {
     Sha256 hash_;
   };
 
+  // kResourceExhausted: with it, what is stored and what is on its way in would be above the quota.
   absl::StatusOr<std::unique_ptr<Upload>> StartUpload(const Digest& digest, int64_t size_bytes);
   // The whole of a small blob.
   absl::Status Put(const Digest& digest, std::string_view bytes);
@@ -105,13 +106,14 @@ class BlobStore {
       : root_(std::move(root)), quota_bytes_(quota_bytes), durability_(durability) {}
   std::filesystem::path PathOf(const Digest& digest) const;
   void Forget(const Digest& digest);
+  absl::Status CheckQuota(int64_t more_bytes) const;
 
   const std::filesystem::path root_;
   const int64_t quota_bytes_;
   const Durability durability_;
   mutable std::mutex mutex_;
   absl::flat_hash_map<Digest, int64_t, DigestHash> sizes_;
-  std::atomic<int64_t> total_bytes_{0};
+  std::atomic<int64_t> total_bytes_{0}, incoming_bytes_{0};  // stored; written by uploads that have not ended
   std::atomic<uint64_t> next_name_{0}, corrupt_{0};
 };
 

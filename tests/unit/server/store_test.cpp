@@ -48,6 +48,20 @@ class StoreTest : public testing::Test {
   std::unique_ptr<BlobStore> blobs;
 };
 
+// Symptom: uploads at a time were held against the quota one by one, and went above it together.
+TEST_F(StoreTest, UploadsAtATimeKeepTheQuotaTogether) {
+  const auto quota = BlobStore::Open(dir.path(), 1000).value();
+  const std::string bytes(600, 'x');
+  const auto one = quota->StartUpload(Sha256Of(bytes), 600), other = quota->StartUpload(Sha256Of(bytes), 600);
+  ASSERT_TRUE(one.ok() && other.ok()) << "nothing has come yet";
+  EXPECT_TRUE((*one)->Append(bytes).ok());
+  EXPECT_TRUE(absl::IsResourceExhausted((*other)->Append(bytes)));
+  EXPECT_TRUE(absl::IsResourceExhausted(quota->StartUpload(Sha256Of("y"), 401).status()));
+  EXPECT_TRUE((*one)->Finish().ok());
+  EXPECT_EQ(quota->total_bytes(), 600);
+  EXPECT_TRUE(quota->Put(Sha256Of(std::string(400, 'z')), std::string(400, 'z')).ok()) << "what failed counts no more";
+}
+
 TEST_F(StoreTest, NewerDatabaseIsRefusedAndUntouched) {
   OpenAll();
   writer.reset();
