@@ -121,8 +121,7 @@ absl::StatusOr<BakeSummary> Bake(const BakeRequest& request, Progress& progress)
     phases.End();
     BAKEWELL_ASSIGN_OR_RETURN(layout, LayoutAfterSignal(submission, clock, progress));
   }
-  BAKEWELL_ASSIGN_OR_RETURN(const Manifest manifest,
-                            BakeEmbedded(submission, threads, layout, out, phases, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(const Manifest manifest, BakeEmbedded(submission, threads, layout, out, phases, progress));
   phases.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
   BAKEWELL_ASSIGN_OR_RETURN(BakeSummary summary, Conclude(out, request.output_dir, manifest));

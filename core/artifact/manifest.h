@@ -21,8 +21,8 @@ struct ManifestFile {
   Digest sha256;
 };
 
-// What manifest.json says; schema/manifest.md is its page. It follows from scene, settings and code alone, whoever baked:
-// what a run took, the program says when it is done.
+// What manifest.json says; schema/manifest.md is its page. It follows from scene, settings and code alone, whoever
+// baked: what a run took, the program says when it is done.
 struct Manifest {
   std::string program = "bakewell";
   std::string version = ProgramVersion();

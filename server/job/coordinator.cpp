@@ -41,10 +41,10 @@ absl::StatusOr<std::unique_ptr<Coordinator>> Coordinator::Open(Options options, 
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   const std::filesystem::path path = options.folder / "farm.db";
-  BAKEWELL_ASSIGN_OR_RETURN(auto tables, store::Tables::Open(path, options.durability));
-  BAKEWELL_ASSIGN_OR_RETURN(auto reader, store::Tables::OpenReadOnly(path));
   BAKEWELL_ASSIGN_OR_RETURN(auto blobs,
                             store::BlobStore::Open(options.folder, options.quota_bytes, options.durability));
+  BAKEWELL_ASSIGN_OR_RETURN(auto tables, store::Tables::Open(path, options.durability));
+  BAKEWELL_ASSIGN_OR_RETURN(auto reader, store::Tables::OpenReadOnly(path));
   auto writer = std::make_unique<store::Writer>(std::move(tables), options.durability);
   const auto learn = [&](const store::BlobRow& blob) { blobs->Learn(blob.digest, blob.size_bytes); };
   BAKEWELL_RETURN_IF_ERROR(reader->ForEachBlob(learn));

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -52,9 +53,20 @@ absl::Status MakeFolders(const fs::path& root, Durability durability) {
 
 absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::Open(const fs::path& root, int64_t quota_bytes,
                                                            Durability durability) {
+  const fs::path path = root / "lock";
+  const int lock = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (lock < 0) return FromErrno(errno, absl::StrCat("opening ", path.string()));
+  std::unique_ptr<BlobStore> store(new BlobStore(root, quota_bytes, durability, lock));
+  // A file system without locks is served all the same.
+  if (flock(lock, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("another bakewell-server uses ", root.string(), ": stop it, or name another --data"));
+  }
   BAKEWELL_RETURN_IF_ERROR(MakeFolders(root, durability));
-  return std::unique_ptr<BlobStore>(new BlobStore(root, quota_bytes, durability));
+  return store;
 }
+
+BlobStore::~BlobStore() { close(lock_); }
 
 fs::path BlobStore::PathOf(const Digest& digest) const {
   const std::string hex = digest.Hex();
@@ -79,9 +91,10 @@ absl::Status BlobStore::CheckQuota(int64_t more_bytes) const {
 }
 
 BlobStore::Upload::~Upload() {
-  store_.incoming_bytes_ -= size_bytes_;
   if (file_ >= 0) close(file_);
-  if (!path_.empty()) unlink(path_.c_str());
+  if (path_.empty()) return;
+  store_.incoming_bytes_ -= size_bytes_;
+  unlink(path_.c_str());
 }
 
 absl::Status BlobStore::Upload::Append(std::string_view bytes) {
@@ -112,6 +125,7 @@ absl::Status BlobStore::Upload::Finish() {
   const fs::path final_path = store_.PathOf(digest_);
   if (rename(path_.c_str(), final_path.c_str()) != 0) return FromErrno(errno, "moving a blob to its place");
   path_.clear();
+  store_.incoming_bytes_ -= size_bytes_;
   if (safe) BAKEWELL_RETURN_IF_ERROR(SyncFolder(final_path.parent_path()));
   store_.Learn(digest_, size_bytes_);
   return absl::OkStatus();

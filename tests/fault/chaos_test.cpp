@@ -133,6 +133,32 @@ TEST_F(Chaos, JobSurvivesKillsCutsAndRotWithTheSameBytes) {
               static_cast<long long>(job->tasks_total()));
 }
 
+// Symptom: in a cluster nobody can make the first token: the server does not start without one, and prints what it
+// makes.
+TEST_F(Chaos, TokenFromAFileIsTakenAndNotPrinted) {
+  const std::string secret(40, 's'), file = dir_.path() / "token", data = dir_.path() / "data";
+  const auto add = [&] {
+    return Process(
+        {SYNTHETIC_SERVER, "--data", data, "token", "add", "--user", "w", "--scopes", "read", "--file", file},
+        (dir_.path() / "token.log").string());
+  };
+  EXPECT_EQ(add().Wait(seconds(10)), 1) << "there is no such file";
+  std::ofstream(file) << "short";
+  EXPECT_EQ(add().Wait(seconds(10)), 1);
+  std::ofstream(file) << secret << "\n";
+  for (int i = 0; i < 2; ++i) {
+    Process again = add();
+    EXPECT_EQ(again.ReadLine(seconds(5)), "");
+    EXPECT_EQ(again.Wait(seconds(10)), 0);
+  }
+  StartServer();
+  ConnectOptions options;
+  options.address = absl::StrCat("localhost:", port_);
+  EXPECT_TRUE(absl::IsUnauthenticated(FarmClient(*Connection::Open(options), seconds(5)).Status().status()));
+  options.token = secret;
+  EXPECT_TRUE(FarmClient(*Connection::Open(options), seconds(5)).Status().ok());
+}
+
 // Symptom: a worker whose task does not listen left the farm after its grace, and its process stayed.
 TEST_F(Chaos, SigtermEndsAWorkerWhoseTaskHangs) {
   StartServer();

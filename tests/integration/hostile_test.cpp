@@ -114,12 +114,9 @@ std::vector<Target> AdminTargets() {
   quota.set_weight(1);
   v1::CollectGarbageRequest collect;
   collect.set_target_bytes(1 << 30);
-  return {{"AdminService/ListWorkers", ""},
-          {"AdminService/Status", ""},
-          {"AdminService/Drain", Text(drain)},
-          {"AdminService/SetPriority", Text(priority)},
-          {"AdminService/SetQuota", Text(quota)},
-          {"AdminService/CollectGarbage", Text(collect)}};
+  return {{"AdminService/ListWorkers", ""},       {"AdminService/Status", ""},
+          {"AdminService/Drain", Text(drain)},    {"AdminService/SetPriority", Text(priority)},
+          {"AdminService/SetQuota", Text(quota)}, {"AdminService/CollectGarbage", Text(collect)}};
 }
 
 std::vector<Target> Targets(const Digest& scene) {
@@ -227,8 +224,8 @@ TEST_F(HostileTest, MutatedMessagesToEveryMethodAreAnsweredAndTheServiceGoesOn) 
   EXPECT_EQ(DigestsOf(*farm.Client()->Get(before.id())), DigestsOf(before));
 }
 
-// Symptom: what a worker or client says was added, subtracted and summed up before it was looked at: overflow, which the
-// sanitizers report and which made a worker's run time negative.
+// Symptom: what a worker or client says was added, subtracted and summed up before it was looked at: overflow, which
+// the sanitizers report and which made a worker's run time negative.
 TEST_F(HostileTest, NumbersAtTheEndsOfTheirRangeAreHarmless) {
   Farm farm(OptionsHere());
   RawCaller caller(farm.Connect()->channel());
@@ -332,9 +329,10 @@ TEST(HostileCoordinator, ItsPackedMessagesAreRefusedByTheClient) {
   const auto server = builder.BuildAndStart();
   ConnectOptions options;
   options.address = absl::StrCat("localhost:", port);
-  FarmClient client(Connection::Open(options).value(), milliseconds(500));
+  FarmClient client(Connection::Open(options).value(), seconds(10));
   const auto job = client.Get(1);
-  EXPECT_FALSE(job.ok()) << job->reason().size();
+  ASSERT_FALSE(job.ok()) << job->reason().size();
+  EXPECT_TRUE(absl::IsInternal(job.status()) || absl::IsUnimplemented(job.status())) << job.status();
   server->Shutdown();
 }
 
