@@ -1,37 +1,15 @@
-#include <absl/strings/str_format.h>
-
 #include <memory>
 
 #include "client/cli/bake_flags.h"
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_display.h"
-#include "core/artifact/json_line.h"
 
 namespace bakewell {
 namespace {
 
 // Runs with validated settings: (settings, progress) -> summary.
 using Work = std::function<absl::StatusOr<BakeSummary>(const BakeSettings&, Progress&)>;
-
-void PrintText(const BakeSummary& summary, const Console& console) {
-  for (const std::string& warning : summary.warnings) console.err << "warning: " << warning << "\n";
-  console.out << absl::StrFormat("%.1f s (%.1f s CPU), %.2f million rays, estimated error %.2f %%\n",
-                                 summary.wall_seconds, summary.cpu_seconds, static_cast<double>(summary.rays) * 1e-6,
-                                 summary.estimated_error * 100);
-  for (const std::filesystem::path& file : summary.files) console.out << file.string() << "\n";
-  console.out << std::flush;
-}
-
-void PrintJson(const BakeSummary& summary, const Console& console) {
-  std::vector<std::string> files;
-  for (const std::filesystem::path& file : summary.files) files.push_back(file.string());
-  JsonLine line;
-  line.Add("event", "done").Add("output", summary.output_dir.string()).Add("files", files);
-  line.Add("warnings", summary.warnings).Add("estimated_error", summary.estimated_error);
-  line.Add("wall_seconds", summary.wall_seconds).Add("cpu_seconds", summary.cpu_seconds).Add("rays", summary.rays);
-  console.out << line.Text() << std::endl;
-}
 
 absl::StatusOr<BakeSummary> RunWithProgress(const BakeFlags& flags, const Work& work, const Console& console) {
   BAKEWELL_RETURN_IF_ERROR(ValidateFlags(flags));
@@ -44,10 +22,9 @@ absl::StatusOr<BakeSummary> RunWithProgress(const BakeFlags& flags, const Work& 
 
 int RunWork(const BakeFlags& flags, const Work& work, const Console& console) {
   const absl::StatusOr<BakeSummary> summary = RunWithProgress(flags, work, console);
-  if (!summary.ok()) {
-    return ReportError(summary.status(), flags.json ? OutputForm::kJson : OutputForm::kText, console);
-  }
-  flags.json ? PrintJson(*summary, console) : PrintText(*summary, console);
+  const OutputForm form = flags.json ? OutputForm::kJson : OutputForm::kText;
+  if (!summary.ok()) return ReportError(summary.status(), form, console);
+  PrintSummary(*summary, form, console);
   return 0;
 }
 

@@ -14,6 +14,9 @@ void AddUnwrapCommand(CLI::App& app, const Console& console, const Bakers& baker
 
 enum class OutputForm { kText, kJson };
 
+// What a bake did and took, as --json says: text, or a line with "event": "done".
+void PrintSummary(const BakeSummary& summary, OutputForm form, const Console& console);
+
 // Prints the error once, where --json says, and returns the exit code that it means.
 int ReportError(const absl::Status& status, OutputForm form, const Console& console);
 

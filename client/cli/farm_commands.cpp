@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_format.h>
 
+#include <chrono>
 #include <memory>
 
 #include "client/cli/bake_flags.h"
@@ -97,13 +98,16 @@ absl::StatusOr<v1::Job> WatchJob(FarmClient& client, int64_t id, const FarmFlags
 }
 
 absl::Status Submit(FarmFlags& flags, const Console& console) {
+  const auto start = std::chrono::steady_clock::now();
   flags.output = flags.bake.output;
   BAKEWELL_ASSIGN_OR_RETURN(const Submission submission, Prepare(flags));
   BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
-  for (const std::string& warning : submission.level.warnings) console.err << "warning: " << warning << "\n";
+  // A folder that cannot be written is said now, not after the bake.
+  if (flags.wait) BAKEWELL_RETURN_IF_ERROR(OutputDir::Create(flags.output).status());
   BAKEWELL_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
                             client->Submit(submission.scene_bytes, OptionsOf(flags, submission)));
   if (!flags.wait) {
+    for (const std::string& warning : submission.level.warnings) console.err << "warning: " << warning << "\n";
     BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client->Get(submitted.job_id()));
     PrintJob(job, flags, console);
     return absl::OkStatus();
@@ -112,9 +116,13 @@ absl::Status Submit(FarmFlags& flags, const Console& console) {
   PrintJob(job, flags, console);
   BAKEWELL_RETURN_IF_ERROR(StatusOfEnded(job, flags.bake.scene));
   BAKEWELL_ASSIGN_OR_RETURN(OutputDir out, OutputDir::Create(flags.output));
-  BAKEWELL_ASSIGN_OR_RETURN(Manifest manifest, FetchResult(*client, job, submission, out));
-  manifest.phases = PhasesOf(job);
-  return Conclude(out, flags.output, manifest).status();
+  BAKEWELL_ASSIGN_OR_RETURN(const Manifest manifest, FetchResult(*client, job, submission, out));
+  BAKEWELL_ASSIGN_OR_RETURN(BakeSummary summary, Conclude(out, flags.output, manifest));
+  summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  summary.cpu_seconds = static_cast<double>(job.run_us()) * 1e-6;
+  summary.phases = PhasesOf(job);
+  PrintSummary(summary, flags.json ? OutputForm::kJson : OutputForm::kText, console);
+  return absl::OkStatus();
 }
 
 absl::Status Estimate(FarmFlags& flags, const Console& console) {

@@ -17,13 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct PageFile {
-  const char* ending;
-  const char* kind;
-};
-constexpr PageFile kPageFiles[] = {
-    {".irradiance.exr", "irradiance"}, {".sh.exr", "sh"}, {".variance.exr", "variance"}, {".png", "preview"}};
-
 std::string PageStem(size_t page) { return absl::StrCat("lightmap-", page); }
 
 // A file that is read once and is no part of the result.
@@ -46,7 +39,7 @@ absl::Status WriteScene(const Submission& submission, const AtlasLayout& layout,
 absl::StatusOr<std::vector<ManifestFile>> DescribeFiles(const fs::path& folder, size_t pages) {
   std::vector<ManifestFile> files;
   for (size_t page = 0; page < pages; ++page) {
-    for (const PageFile& one : kPageFiles) {
+    for (const level_task::PageFile& one : level_task::kPageFiles) {
       BAKEWELL_ASSIGN_OR_RETURN(ManifestFile file, DescribeFile(folder / (PageStem(page) + one.ending), one.kind));
       files.push_back(std::move(file));
     }

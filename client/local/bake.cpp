@@ -58,7 +58,8 @@ class Canceller {
         if (!farm.client().Cancel(job).ok()) farm.client().StopWatching();
         return;
       }
-      wake_.wait_for(lock, stop, std::chrono::milliseconds(50), [] { return false; });
+      // A signal handler can set a flag, and wake nobody.
+      wake_.wait_for(lock, stop, std::chrono::milliseconds(200), [] { return false; });
     }
   }
 
@@ -120,12 +121,12 @@ absl::StatusOr<BakeSummary> Bake(const BakeRequest& request, Progress& progress)
     phases.End();
     BAKEWELL_ASSIGN_OR_RETURN(layout, LayoutAfterSignal(submission, clock, progress));
   }
-  BAKEWELL_ASSIGN_OR_RETURN(Manifest manifest, BakeEmbedded(submission, threads, layout, out, phases, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(const Manifest manifest, BakeEmbedded(submission, threads, layout, out, phases, progress));
   phases.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
-  manifest.phases = clock.phases();
-  manifest.peak_memory_bytes = PhaseClock::PeakMemoryBytes();
   BAKEWELL_ASSIGN_OR_RETURN(BakeSummary summary, Conclude(out, request.output_dir, manifest));
+  summary.phases = clock.phases();
+  summary.peak_memory_bytes = PhaseClock::PeakMemoryBytes();
   summary.wall_seconds = PhaseClock::WallSeconds() - wall;
   summary.cpu_seconds = PhaseClock::CpuSeconds() - cpu;
   return summary;

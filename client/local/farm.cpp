@@ -39,7 +39,8 @@ WorkerOptions OptionsOfWorker(int threads) {
 }  // namespace
 
 EmbeddedFarm::EmbeddedFarm(int threads, Progress& progress)
-    : planner_({threads * kTaskOfAThread, kAnyNumber, kAnyNumber}), executor_({threads, &progress}) {}
+    : planner_({threads * kTaskOfAThread, kAnyNumber, kAnyNumber}),
+      executor_({.threads = threads, .progress = &progress}) {}
 
 absl::StatusOr<std::unique_ptr<EmbeddedFarm>> EmbeddedFarm::Start(const std::filesystem::path& folder, int threads,
                                                                   const std::string& layout, Progress& progress) {

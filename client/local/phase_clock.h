@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/artifact/manifest.h"
+#include "core/artifact/phase_time.h"
 #include "core/artifact/progress.h"
 
 namespace bakewell {

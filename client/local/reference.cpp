@@ -115,9 +115,9 @@ absl::StatusOr<BakeSummary> BakeReference(const ReferenceRequest& request, Progr
     BAKEWELL_RETURN_IF_ERROR(writer.Exr(name + ".stderr.exr", "standard-error", images.standard_error));
     BAKEWELL_RETURN_IF_ERROR(writer.Preview(name + ".png", images.mean));
   }
-  manifest.phases = clock.phases();
-  manifest.peak_memory_bytes = PhaseClock::PeakMemoryBytes();
   BAKEWELL_ASSIGN_OR_RETURN(BakeSummary summary, Conclude(out, request.output_dir, manifest));
+  summary.phases = clock.phases();
+  summary.peak_memory_bytes = PhaseClock::PeakMemoryBytes();
   summary.wall_seconds = PhaseClock::WallSeconds() - wall;
   summary.cpu_seconds = PhaseClock::CpuSeconds() - cpu;
   return summary;

@@ -107,14 +107,18 @@ absl::Status FarmClient::UploadScene(std::string_view scene, const Digest& diges
 
 absl::StatusOr<v1::SubmitResponse> FarmClient::Submit(std::string_view scene, const SubmitOptions& options) {
   const Digest digest = Sha256Of(scene);
-  BAKEWELL_RETURN_IF_ERROR(UploadScene(scene, digest));
   const v1::SubmitRequest request = RequestOf(digest, options);
   v1::SubmitResponse response;
-  const absl::Status status = Retry([&] {
-    grpc::ClientContext context;
-    connection_->Prepare(context, kSubmitCall);
-    return FromGrpc(stubs_->bake->Submit(&context, request, &response));
-  });
+  const auto submit = [&]() -> absl::Status {
+    BAKEWELL_RETURN_IF_ERROR(UploadScene(scene, digest));
+    return Retry([&] {
+      grpc::ClientContext context;
+      connection_->Prepare(context, kSubmitCall);
+      return FromGrpc(stubs_->bake->Submit(&context, request, &response));
+    });
+  };
+  absl::Status status = submit();
+  if (absl::IsNotFound(status)) status = submit();  // the scene was collected meanwhile
   BAKEWELL_RETURN_IF_ERROR(status);
   return response;
 }

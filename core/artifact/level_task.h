@@ -29,9 +29,19 @@ inline constexpr KindName kSurvey{"texel/survey", 3};
 inline constexpr KindName kEmit{"photon/emit", 5};
 inline constexpr KindName kDensity{"photon/density", 4};
 inline constexpr KindName kGather{"gather/tiles", 7};
-inline constexpr KindName kFinish{"finish/page", 6};
+inline constexpr KindName kFinish{"finish/page", 7};
 inline constexpr KindName kReport{"finish/report", 4};
 inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};
+
+// The files of page P are lightmap-P and each of these.
+struct PageFile {
+  const char *ending, *kind;  // kind: in the manifest
+};
+inline constexpr PageFile kPageFiles[] = {{".irradiance.exr", "irradiance"},
+                                          {".sh.exr", "sh"},
+                                          {".variance.exr", "variance"},
+                                          {".png", "preview"},
+                                          {".charts.json", "charts"}};
 
 // The artifacts that are no files of the result: they say how to write scene.glb and the manifest.
 inline constexpr char kLayoutArtifact[] = "atlas-layout.bin";

@@ -11,15 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormatVersion = 1;
-
-Json PhasesJson(const std::vector<PhaseTime>& phases) {
-  Json array = Json::array();
-  for (const PhaseTime& phase : phases) {
-    array.push_back({{"phase", phase.phase}, {"wall_seconds", phase.wall_seconds}, {"cpu_seconds", phase.cpu_seconds}});
-  }
-  return array;
-}
+constexpr int kFormatVersion = 2;
 
 Json FilesJson(const std::vector<ManifestFile>& files) {
   Json array = Json::array();
@@ -53,18 +45,9 @@ Json CountersJson(const std::map<std::string, int64_t>& counters) {
 }
 
 Json StatisticsJson(const Manifest& manifest) {
-  double wall_seconds = 0, cpu_seconds = 0;
-  for (const PhaseTime& phase : manifest.phases) {
-    wall_seconds += phase.wall_seconds;
-    cpu_seconds += phase.cpu_seconds;
-  }
-  return {{"wall_seconds", wall_seconds},
-          {"cpu_seconds", cpu_seconds},
-          {"rays", manifest.rays},
+  return {{"rays", manifest.rays},
           {"photons", manifest.photons},
           {"estimated_error", manifest.estimated_error},
-          {"peak_memory_bytes", manifest.peak_memory_bytes > 0 ? Json(manifest.peak_memory_bytes) : Json()},
-          {"phases", PhasesJson(manifest.phases)},
           {"counters", CountersJson(manifest.counters)},
           {"skip", SkipJson(manifest.counters)}};
 }

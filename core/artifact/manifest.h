@@ -14,12 +14,6 @@ namespace bakewell {
 // The program's version, "0.1.0".
 std::string ProgramVersion();
 
-struct PhaseTime {
-  std::string phase;  // as Progress::Report names it
-  double wall_seconds = 0;
-  double cpu_seconds = 0;  // of all threads
-};
-
 struct ManifestFile {
   std::string name;  // relative to the manifest's folder
   std::string kind;  // irradiance, sh, variance, preview, scene, probe; schema/manifest.md lists them
@@ -27,7 +21,8 @@ struct ManifestFile {
   Digest sha256;
 };
 
-// What manifest.json says; schema/manifest.md is its page.
+// What manifest.json says; schema/manifest.md is its page. It follows from scene, settings and code alone, whoever
+// baked: what a run took, the program says when it is done.
 struct Manifest {
   std::string program = "bakewell";
   std::string version = ProgramVersion();
@@ -35,12 +30,10 @@ struct Manifest {
   std::string scene_file;                    // name only: the folder does not say where it was baked
   Digest scene_digest;                       // of the canonical scene
   std::string settings_json = "{}";          // SettingsJson(settings)
-  std::vector<PhaseTime> phases;             // in the order they ran
   std::map<std::string, int64_t> counters;   // slash names: gather/rays, skip/dark_chart
   int64_t rays = 0;
   int64_t photons = 0;
-  int64_t peak_memory_bytes = 0;  // resident, of the process that baked and wrote this; 0: others baked
-  double estimated_error = 0;     // relative standard error of the irradiance, root mean square over valid texels
+  double estimated_error = 0;  // relative standard error of the irradiance, root mean square over valid texels
   std::vector<std::string> warnings;
   std::vector<ManifestFile> files;
 };

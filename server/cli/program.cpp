@@ -7,6 +7,7 @@
 #include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
+#include <fstream>
 #include <iostream>
 #include <map>
 #include <random>
@@ -33,6 +34,7 @@ struct TokenFlags {
   std::string user;
   std::vector<std::string> scopes;
   int days = 0;
+  std::string file;  // has the token; empty: one is made and printed
 };
 
 int Report(const absl::Status& status) {
@@ -120,11 +122,19 @@ absl::Status AddToken(const std::string& data, const TokenFlags& flags) {
   if (!IsPlainName(flags.user)) return absl::InvalidArgumentError("--user must be 1 to 64 of [A-Za-z0-9_.-]");
   std::filesystem::create_directories(data);
   BAKEWELL_ASSIGN_OR_RETURN(const auto tables, store::Tables::Open(std::filesystem::path(data) / "farm.db"));
-  const std::string token = RandomToken();
+  std::string token = RandomToken();
+  if (!flags.file.empty()) {
+    constexpr size_t kLeastCharacters = 32;
+    std::ifstream file(flags.file);
+    if (!(file >> token) || token.size() < kLeastCharacters) {
+      return absl::InvalidArgumentError(absl::StrCat("no token of at least ", kLeastCharacters, " characters in ",
+                                                     flags.file, "; `openssl rand -hex 32` makes one"));
+    }
+  }
   const int64_t expires_us = flags.days == 0 ? 0 : NowUs() + int64_t{86'400'000'000} * flags.days;
   BAKEWELL_RETURN_IF_ERROR(
       tables->PutToken({Sha256Of(token), flags.user, ScopesFrom(flags.scopes), NowUs(), expires_us}));
-  std::cout << token << "\n";
+  if (flags.file.empty()) std::cout << token << "\n";
   return absl::OkStatus();
 }
 
@@ -148,6 +158,7 @@ void AddServeFlags(CLI::App& serve, ServeFlags& flags) {
   serve.add_option("--max-scene", flags.defaults.max_scene_bytes, "bytes of a user's scene; 0: no limit")
       ->transform(CLI::AsSizeValue(false));
   serve.add_option("--max-jobs", flags.defaults.max_jobs, "jobs that a user may have running; 0: no limit");
+  serve.add_option("--max-tasks", flags.defaults.max_tasks, "tasks of a job; 0: no limit");
   serve.add_option("--heartbeat-timeout", flags.heartbeat_timeout_s, "seconds until a silent worker's tasks go back")
       ->check(CLI::Range(1, 3600));
 }
@@ -181,6 +192,7 @@ int RunServerProgram(int argc, char** argv, const plan::Planner& planner, const 
       ->delimiter(',')
       ->check(CLI::IsMember({"submit", "work", "read", "admin"}));
   add->add_option("--days", token_flags.days, "valid for; 0: for ever");
+  add->add_option("--file", token_flags.file, "has the token: nothing is made or printed; may be repeated");
   add->callback([&] { exit_code = Report(AddToken(flags.data, token_flags)); });
   CLI::App* revoke = token->add_subcommand("revoke", "Revoke every token of a user");
   revoke->add_option("--user", token_flags.user)->required();

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "core/base/caught.h"
+
 namespace bakewell::job {
 
 namespace {
@@ -39,10 +41,10 @@ absl::StatusOr<std::unique_ptr<Coordinator>> Coordinator::Open(Options options, 
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   const std::filesystem::path path = options.folder / "farm.db";
-  BAKEWELL_ASSIGN_OR_RETURN(auto tables, store::Tables::Open(path, options.durability));
-  BAKEWELL_ASSIGN_OR_RETURN(auto reader, store::Tables::OpenReadOnly(path));
   BAKEWELL_ASSIGN_OR_RETURN(auto blobs,
                             store::BlobStore::Open(options.folder, options.quota_bytes, options.durability));
+  BAKEWELL_ASSIGN_OR_RETURN(auto tables, store::Tables::Open(path, options.durability));
+  BAKEWELL_ASSIGN_OR_RETURN(auto reader, store::Tables::OpenReadOnly(path));
   auto writer = std::make_unique<store::Writer>(std::move(tables), options.durability);
   const auto learn = [&](const store::BlobRow& blob) { blobs->Learn(blob.digest, blob.size_bytes); };
   BAKEWELL_RETURN_IF_ERROR(reader->ForEachBlob(learn));
@@ -111,10 +113,24 @@ absl::Status Coordinator::Recover() {
   }
   std::reverse(running.begin(), running.end());  // oldest first, as they were submitted
   for (const store::JobRow& row : running) {
-    const absl::Status status = RecoverJob(row);
-    if (!status.ok()) options_.log(absl::StrCat("job ", row.id, " cannot go on: ", status.ToString()));
+    const absl::Status status = Caught([&] { return RecoverJob(row); });
+    if (status.ok()) continue;
+    options_.log(absl::StrCat("job ", row.id, " cannot go on: ", status.ToString()));
+    BAKEWELL_RETURN_IF_ERROR(FailUnrecovered(row, status));
   }
   return absl::OkStatus();
+}
+
+// Nobody waits for a job for ever that is in the database and cannot run.
+absl::Status Coordinator::FailUnrecovered(store::JobRow row, const absl::Status& why) {
+  row.state = store::JobState::kFailed;
+  row.reason = absl::StrCat("it could not go on after a restart; submit it again: ", std::string(why.message()));
+  row.code = static_cast<int>(why.code());
+  row.finished_us = WallNowUs();
+  return writer_->Run([&](store::Tables& tables) -> absl::Status {
+    BAKEWELL_RETURN_IF_ERROR(tables.UpdateJob(row));
+    return tables.DeleteStages(row.id);
+  });
 }
 
 absl::Status Coordinator::RecoverJob(const store::JobRow& row) {
@@ -124,8 +140,11 @@ absl::Status Coordinator::RecoverJob(const store::JobRow& row) {
     BAKEWELL_ASSIGN_OR_RETURN(graphs, reader_->Stages(row.id));
   }
   std::vector<Stage> stages;
+  std::vector<plan::TaskGraph> before;
   for (const std::string& bytes : graphs) {
     BAKEWELL_ASSIGN_OR_RETURN(plan::TaskGraph graph, plan::ParseGraph(bytes));
+    BAKEWELL_RETURN_IF_ERROR(plan::CheckGraph(graph, before));
+    before.push_back(graph);
     BAKEWELL_ASSIGN_OR_RETURN(Stage stage, LookUp(std::move(graph)));
     stages.push_back(std::move(stage));
   }

@@ -190,20 +190,25 @@ void Coordinator::EndJob(int64_t id, store::JobState state, const absl::Status& 
 }
 
 absl::Status Coordinator::Cancel(int64_t id) {
+  constexpr auto kPatience = std::chrono::seconds(5);  // with a disk that takes nothing
   BAKEWELL_RETURN_IF_ERROR(Get(id).status());
-  std::promise<absl::Status> promise;
+  const auto ended = std::make_shared<std::promise<absl::Status>>();
   {
     const Lock lock(mutex_);
     EndJob(id, store::JobState::kCancelled, absl::CancelledError("cancelled"),
-           [&](const absl::Status& status) { promise.set_value(status); });
+           [ended](const absl::Status& status) { ended->set_value(status); });
     HandleEvents();
     Dispatch();
   }
-  return promise.get_future().get();
+  auto future = ended->get_future();
+  if (future.wait_for(kPatience) == std::future_status::ready) return future.get();
+  return absl::UnavailableError(absl::StrCat("job ", id, " runs no more, but that is not safe on disk yet: ",
+                                             std::string(writer_->Trouble().message()), "; repeat it"));
 }
 
 absl::Status Coordinator::SetPriority(int64_t id, int priority) {
   if (priority < 0 || priority > 1000) return absl::InvalidArgumentError("a priority is from 0 to 1000");
+  BAKEWELL_RETURN_IF_ERROR(CheckWritable());
   store::JobRow row;
   {
     const Lock lock(mutex_);
@@ -218,6 +223,7 @@ absl::Status Coordinator::SetPriority(int64_t id, int priority) {
 }
 
 absl::Status Coordinator::SetAccount(const store::AccountRow& account) {
+  BAKEWELL_RETURN_IF_ERROR(CheckWritable());
   return writer_->Run([&](store::Tables& tables) { return tables.PutAccount(account); });
 }
 

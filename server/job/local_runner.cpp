@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <future>
 
+#include "core/base/caught.h"
+
 namespace bakewell::job {
 
 LocalRunner::LocalRunner(Coordinator& coordinator, LocalTasks tasks, int threads)
@@ -57,7 +59,7 @@ void LocalRunner::Loop(std::stop_token stop) {
 
 void LocalRunner::Run(const TaskLease& lease) {
   const auto start = std::chrono::steady_clock::now();
-  const auto outputs = Make(lease);
+  const auto outputs = Caught([&] { return Make(lease); });
   if (!outputs.ok()) {
     coordinator_.Fail({worker_, lease.token, lease.key, outputs.status(), {}});
     return;

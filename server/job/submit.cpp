@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/base/caught.h"
 #include "core/base/check.h"
 #include "server/job/coordinator.h"
 
@@ -19,6 +20,13 @@ std::chrono::microseconds Scaled(std::chrono::microseconds time, double factor) 
 }
 
 }  // namespace
+
+// While a full disk is waited for, who asks for more is told so, and does not wait on one of the few io threads.
+absl::Status Coordinator::CheckWritable() const {
+  const absl::Status trouble = writer_->Stuck();
+  if (trouble.ok()) return trouble;
+  return absl::UnavailableError(absl::StrCat("nothing can be written now: ", std::string(trouble.message())));
+}
 
 absl::Status Coordinator::CheckRequest(const SubmitRequest& request) {
   if (!IsPlainName(request.client_key)) {
@@ -138,6 +146,7 @@ absl::StatusOr<SubmitResult> Coordinator::Submit(const SubmitRequest& request) {
   };
   BAKEWELL_ASSIGN_OR_RETURN(const auto same, find_same());
   if (same) return SameJob(*same, request);
+  BAKEWELL_RETURN_IF_ERROR(CheckWritable());
   BAKEWELL_ASSIGN_OR_RETURN(const store::AccountRow account, AccountOf(request.user));
   BAKEWELL_RETURN_IF_ERROR(CheckQuota(request, account));
 
@@ -277,10 +286,12 @@ Coordinator::TaskId Coordinator::AddTask(Job& job, const plan::PlannedTask& plan
 
 void Coordinator::ContinueLater(int64_t id) {
   io_.Post([this, id] {
-    const absl::Status status = ContinueJob(id);
+    const absl::Status status = Caught([&] { return ContinueJob(id); });
     if (status.ok()) return;
     const Lock lock(mutex_);
     EndJob(id, store::JobState::kFailed, status, {});
+    HandleEvents();
+    Dispatch();
   });
 }
 

@@ -1,4 +1,5 @@
 // Workers: what they are given, and what becomes of their answers.
+#include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -80,7 +81,7 @@ bool Coordinator::AddCredit(sched::WorkerId id, int credit) {
   const Lock lock(mutex_);
   const auto worker = workers_.find(id);
   if (worker == workers_.end()) return false;
-  worker->second.credit = std::clamp(worker->second.credit + credit, 0, kMaxCredit);
+  worker->second.credit = std::clamp(worker->second.credit + std::clamp(credit, 0, kMaxCredit), 0, kMaxCredit);
   LeaseTo(id, worker->second);
   HandleEvents();
   return true;
@@ -294,7 +295,7 @@ void Coordinator::NoteFailure(const Task& task, const std::string& worker, const
   const store::FailureRow row{WallNowUs(), task.jobs.empty() ? 0 : task.jobs.front(), task.spec.kind, task.key, worker,
                               reason};
   options_.log(absl::StrCat("job ", row.job, ": ", row.kind, " ", task.key.digest.Hex().substr(0, 12), " on ", worker,
-                            ": ", reason));
+                            ": ", absl::Utf8SafeCEscape(reason)));
   writer_->Submit([row](store::Tables& tables) { return tables.InsertFailure(row); });
 }
 

@@ -19,7 +19,7 @@ using std::chrono::microseconds;
 
 // Measured costs on one core of the build machine (tests/bench has the machine); the
 // scheduler corrects them by what it sees.
-constexpr double kPhotonUs = 4;
+constexpr double kPhotonUs = 1;
 constexpr double kSampleUs = 2.5;
 constexpr double kFinishUs = 500'000;
 constexpr double kReportUs = 20'000;
@@ -142,8 +142,8 @@ TaskKey AddPage(const Context& context, const std::vector<TileGroup>& groups, ui
   Need(finish, "layout", context.chart, "layout");
   for (size_t i = 0; i < makers.size(); ++i) Need(finish, absl::StrCat("lights", i), makers[i], "lights");
   const TaskKey key = Add(graph, std::move(finish));
-  for (const char* ending : {".irradiance.exr", ".png", ".sh.exr", ".variance.exr"}) {
-    const std::string name = absl::StrCat("lightmap-", page, ending);
+  for (const level_task::PageFile& file : level_task::kPageFiles) {
+    const std::string name = absl::StrCat("lightmap-", page, file.ending);
     graph.artifacts.push_back({name, {key, name}});
   }
   return key;

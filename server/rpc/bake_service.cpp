@@ -27,6 +27,9 @@ absl::StatusOr<job::SubmitRequest> RequestOf(const Caller& caller, const v1::Sub
 absl::StatusOr<store::JobFilter> FilterOf(const Caller& caller, const v1::ListRequest& request) {
   store::JobFilter filter;
   filter.user = caller.Has(Scope::kAdmin) ? request.user() : caller.user;
+  if (!v1::JobState_IsValid(request.state())) {
+    return absl::InvalidArgumentError(absl::StrCat("no state ", static_cast<int>(request.state())));
+  }
   if (request.state() != v1::JOB_STATE_UNSPECIFIED) {
     filter.state = static_cast<store::JobState>(request.state() - v1::RUNNING);
   }
@@ -133,6 +136,7 @@ grpc::ServerUnaryReactor* BakeService::List(grpc::CallbackServerContext* context
     BAKEWELL_ASSIGN_OR_RETURN(const store::JobFilter filter, FilterOf(caller, *request));
     BAKEWELL_ASSIGN_OR_RETURN(std::vector<job::JobView> views, services_.coordinator.List(filter));
     for (job::JobView& view : views) {
+      view.phases.clear();
       view.artifacts.clear();
       *response->add_jobs() = MessageOf(view);
     }

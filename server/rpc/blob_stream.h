@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "core/base/caught.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/status.h"
 #include "server/rpc/call.h"
@@ -49,7 +50,7 @@ class BlobStream final : public grpc::ServerWriteReactor<Chunk> {
 
  private:
   void Start() {
-    const absl::StatusOr<BlobRange> range = choose_();
+    const absl::StatusOr<BlobRange> range = Caught(choose_);
     const absl::Status status = range.ok() ? Open(*range) : range.status();
     if (!status.ok())
       this->Finish(services_.Answer(peer_, status));

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "core/base/caught.h"
 #include "proto/rpc/status.h"
 #include "server/rpc/auth.h"
 #include "server/rpc/refusal_log.h"
@@ -40,7 +41,7 @@ grpc::ServerUnaryReactor* OnIo(Services& services, grpc::CallbackServerContext* 
     return reactor;
   }
   services.coordinator.io().Post([reactor, context, &services, work = std::move(work), caller = *caller]() mutable {
-    reactor->Finish(services.Answer(context->peer(), work(caller)));
+    reactor->Finish(services.Answer(context->peer(), Caught([&]() -> absl::Status { return work(caller); })));
   });
   return reactor;
 }

@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+
 #include "server/rpc/lease_stream.h"
 
 namespace bakewell::rpc {
@@ -12,6 +14,7 @@ namespace {
 constexpr int kHeartbeatsPerTimeout = 3;
 constexpr size_t kMaxReasonBytes = 4 << 10;
 constexpr int kMaxHeld = 1024;
+constexpr int64_t kMaxRunUs = int64_t{30} * 24 * 3600 * 1'000'000;  // sums of what a liar says do not overflow
 
 std::string KindNames(const std::vector<plan::Kind>& kinds) {
   std::string names;
@@ -69,7 +72,7 @@ absl::StatusOr<job::CompletedTask> CompletedFrom(const v1::CompleteRequest& requ
                           sched::LeaseToken{request.token()},
                           {},
                           {},
-                          std::chrono::microseconds(request.run_us())};
+                          std::chrono::microseconds(std::clamp<int64_t>(request.run_us(), 0, kMaxRunUs))};
   BAKEWELL_ASSIGN_OR_RETURN(task.key, KeyFrom(request.key()));
   for (const v1::TaskOutput& output : request.outputs()) {
     if (!IsPlainPath(output.name())) return absl::InvalidArgumentError("an output's name must be a plain path");

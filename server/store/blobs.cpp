@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -52,9 +53,20 @@ absl::Status MakeFolders(const fs::path& root, Durability durability) {
 
 absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::Open(const fs::path& root, int64_t quota_bytes,
                                                            Durability durability) {
+  const fs::path path = root / "lock";
+  const int lock = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (lock < 0) return FromErrno(errno, absl::StrCat("opening ", path.string()));
+  std::unique_ptr<BlobStore> store(new BlobStore(root, quota_bytes, durability, lock));
+  // A file system without locks is served all the same.
+  if (flock(lock, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("another bakewell-server uses ", root.string(), ": stop it, or name another --data"));
+  }
   BAKEWELL_RETURN_IF_ERROR(MakeFolders(root, durability));
-  return std::unique_ptr<BlobStore>(new BlobStore(root, quota_bytes, durability));
+  return store;
 }
+
+BlobStore::~BlobStore() { close(lock_); }
 
 fs::path BlobStore::PathOf(const Digest& digest) const {
   const std::string hex = digest.Hex();
@@ -63,10 +75,7 @@ fs::path BlobStore::PathOf(const Digest& digest) const {
 
 absl::StatusOr<std::unique_ptr<BlobStore::Upload>> BlobStore::StartUpload(const Digest& digest, int64_t size_bytes) {
   if (size_bytes < 0) return absl::InvalidArgumentError("store: negative blob size");
-  if (quota_bytes_ > 0 && total_bytes() + size_bytes > quota_bytes_) {
-    return absl::ResourceExhaustedError(absl::StrCat("store: ", total_bytes(), " of ", quota_bytes_,
-                                                     " bytes used, a blob of ", size_bytes, " does not fit"));
-  }
+  BAKEWELL_RETURN_IF_ERROR(CheckQuota(size_bytes));
   std::unique_ptr<Upload> upload(new Upload(*this, digest, size_bytes));
   upload->path_ = root_ / "incoming" / absl::StrCat(next_name_.fetch_add(1));
   upload->file_ = open(upload->path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
@@ -74,9 +83,18 @@ absl::StatusOr<std::unique_ptr<BlobStore::Upload>> BlobStore::StartUpload(const 
   return upload;
 }
 
+absl::Status BlobStore::CheckQuota(int64_t more_bytes) const {
+  const int64_t used = total_bytes() + incoming_bytes_.load(std::memory_order_relaxed);
+  if (quota_bytes_ == 0 || more_bytes <= quota_bytes_ - used) return absl::OkStatus();
+  return absl::ResourceExhaustedError(absl::StrCat("store: ", used, " of ", quota_bytes_, " bytes used, ", more_bytes,
+                                                   " more do not fit: collect garbage or raise the quota"));
+}
+
 BlobStore::Upload::~Upload() {
   if (file_ >= 0) close(file_);
-  if (!path_.empty()) unlink(path_.c_str());
+  if (path_.empty()) return;
+  store_.incoming_bytes_ -= size_bytes_;
+  unlink(path_.c_str());
 }
 
 absl::Status BlobStore::Upload::Append(std::string_view bytes) {
@@ -84,6 +102,7 @@ absl::Status BlobStore::Upload::Append(std::string_view bytes) {
     return absl::InvalidArgumentError(
         absl::StrCat("blob ", digest_.Hex(), ": more than the declared ", declared_bytes_, " bytes"));
   }
+  BAKEWELL_RETURN_IF_ERROR(store_.CheckQuota(std::ssize(bytes)));
   hash_.Update(std::as_bytes(std::span(bytes)));
   for (size_t done = 0; done < bytes.size();) {
     const ssize_t wrote = write(file_, bytes.data() + done, bytes.size() - done);
@@ -91,7 +110,8 @@ absl::Status BlobStore::Upload::Append(std::string_view bytes) {
     if (wrote < 0) return FromErrno(errno, absl::StrCat("writing blob ", digest_.Hex()));
     done += static_cast<size_t>(wrote);
   }
-  size_bytes_ += static_cast<int64_t>(bytes.size());
+  size_bytes_ += std::ssize(bytes);
+  store_.incoming_bytes_ += std::ssize(bytes);
   return absl::OkStatus();
 }
 
@@ -105,6 +125,7 @@ absl::Status BlobStore::Upload::Finish() {
   const fs::path final_path = store_.PathOf(digest_);
   if (rename(path_.c_str(), final_path.c_str()) != 0) return FromErrno(errno, "moving a blob to its place");
   path_.clear();
+  store_.incoming_bytes_ -= size_bytes_;
   if (safe) BAKEWELL_RETURN_IF_ERROR(SyncFolder(final_path.parent_path()));
   store_.Learn(digest_, size_bytes_);
   return absl::OkStatus();

@@ -24,9 +24,14 @@ namespace bakewell::store {
 // Durability::kScratch does not sync, and has ROOT/blobs/abcd...
 class BlobStore {
  public:
-  // Deletes what a former process left in ROOT/incoming. `quota_bytes` 0: no limit.
+  // Deletes what a former process left in ROOT/incoming, and holds ROOT/lock as long as it lives. `quota_bytes` 0: no
+  // limit. kFailedPrecondition: another process has the store.
   static absl::StatusOr<std::unique_ptr<BlobStore>> Open(const std::filesystem::path& root, int64_t quota_bytes,
                                                          Durability durability = Durability::kSafe);
+
+  ~BlobStore();
+  BlobStore(const BlobStore&) = delete;
+  BlobStore& operator=(const BlobStore&) = delete;
 
   // A blob on its way in; forgotten and deleted unless Finish() succeeds. One thread at a time; its store outlives it.
   class Upload {
@@ -53,6 +58,7 @@ class BlobStore {
     Sha256 hash_;
   };
 
+  // kResourceExhausted: with it, what is stored and what is on its way in would be above the quota.
   absl::StatusOr<std::unique_ptr<Upload>> StartUpload(const Digest& digest, int64_t size_bytes);
   // The whole of a small blob.
   absl::Status Put(const Digest& digest, std::string_view bytes);
@@ -101,17 +107,19 @@ class BlobStore {
   size_t count() const;
 
  private:
-  BlobStore(std::filesystem::path root, int64_t quota_bytes, Durability durability)
-      : root_(std::move(root)), quota_bytes_(quota_bytes), durability_(durability) {}
+  BlobStore(std::filesystem::path root, int64_t quota_bytes, Durability durability, int lock)
+      : root_(std::move(root)), quota_bytes_(quota_bytes), durability_(durability), lock_(lock) {}
   std::filesystem::path PathOf(const Digest& digest) const;
   void Forget(const Digest& digest);
+  absl::Status CheckQuota(int64_t more_bytes) const;
 
   const std::filesystem::path root_;
   const int64_t quota_bytes_;
   const Durability durability_;
+  const int lock_;  // a file
   mutable std::mutex mutex_;
   absl::flat_hash_map<Digest, int64_t, DigestHash> sizes_;
-  std::atomic<int64_t> total_bytes_{0};
+  std::atomic<int64_t> total_bytes_{0}, incoming_bytes_{0};  // stored; written by uploads that have not ended
   std::atomic<uint64_t> next_name_{0}, corrupt_{0};
 };
 

@@ -125,11 +125,51 @@ TEST_F(Chaos, JobSurvivesKillsCutsAndRotWithTheSameBytes) {
   const auto again = Client()->Submit(scene.Text(), {"chaos", "chaos", "", false});
   EXPECT_EQ(again->job_id(), submitted->job_id());
   EXPECT_TRUE(WaitFor([&] { return Client()->Status()->leases() == 0; }));
-  for (size_t i = 0; i < workers_.size(); ++i) workers_[i]->Signal(SIGTERM);
-  for (size_t i = 0; i < workers_.size(); ++i) workers_[i]->Wait(seconds(10));
+  workers_[3]->Kill();  // which hangs, unless it was killed before
+  for (size_t i = 0; i < 3; ++i) workers_[i]->Signal(SIGTERM);
+  for (size_t i = 0; i < 3; ++i) EXPECT_EQ(workers_[i]->Wait(seconds(10)), 0) << i;
   EXPECT_TRUE(WaitFor([&] { return Client()->Status()->workers() == 0; }, seconds(10)));
   std::printf("chaos: %d kills, %d connections through the proxy, %lld tasks\n", done_kills, proxy_->connections(),
               static_cast<long long>(job->tasks_total()));
+}
+
+// Symptom: in a cluster nobody can make the first token: the server does not start without one, and prints what it
+// makes.
+TEST_F(Chaos, TokenFromAFileIsTakenAndNotPrinted) {
+  const std::string secret(40, 's'), file = dir_.path() / "token", data = dir_.path() / "data";
+  const auto add = [&] {
+    return Process(
+        {SYNTHETIC_SERVER, "--data", data, "token", "add", "--user", "w", "--scopes", "read", "--file", file},
+        (dir_.path() / "token.log").string());
+  };
+  EXPECT_EQ(add().Wait(seconds(10)), 1) << "there is no such file";
+  std::ofstream(file) << "short";
+  EXPECT_EQ(add().Wait(seconds(10)), 1);
+  std::ofstream(file) << secret << "\n";
+  for (int i = 0; i < 2; ++i) {
+    Process again = add();
+    EXPECT_EQ(again.ReadLine(seconds(5)), "");
+    EXPECT_EQ(again.Wait(seconds(10)), 0);
+  }
+  StartServer();
+  ConnectOptions options;
+  options.address = absl::StrCat("localhost:", port_);
+  EXPECT_TRUE(absl::IsUnauthenticated(FarmClient(*Connection::Open(options), seconds(5)).Status().status()));
+  options.token = secret;
+  EXPECT_TRUE(FarmClient(*Connection::Open(options), seconds(5)).Status().ok());
+}
+
+// Symptom: a worker whose task does not listen left the farm after its grace, and its process stayed.
+TEST_F(Chaos, SigtermEndsAWorkerWhoseTaskHangs) {
+  StartServer();
+  Process hung({SYNTHETIC_WORKER, "--server", absl::StrCat("localhost:", port_), "--name", "hung", "--grace", "0.5"},
+               (dir_.path() / "hung.log").string(), {{"BAKEWELL_TEST_FAULT", "hang"}});
+  const auto submitted = Client()->Submit(SyntheticScene().Text(), {"hang", "", "", false});
+  ASSERT_TRUE(submitted.ok()) << submitted.status();
+  ASSERT_TRUE(WaitFor([&] { return Client()->Status()->leases() > 0; }));
+  hung.Signal(SIGTERM);
+  EXPECT_EQ(hung.Wait(seconds(10)), 0);
+  EXPECT_EQ(Client()->Status()->leases(), 0);
 }
 
 TEST_F(Chaos, SigtermEndsTheServerAndTheJobGoesOnAfterwards) {

@@ -32,7 +32,7 @@ class Rogue {
     });
   }
   ~Rogue() {
-    link_.HangUp();
+    link_.HangUpForGood();
     listener_.join();
   }
   LeasedTask Next() {

@@ -298,6 +298,71 @@ TEST_F(FarmTest, DrainedWorkerFinishesAndLeaves) {
   EXPECT_EQ(farm.coordinator().GetStats().failed, 0);
 }
 
+// Symptom: a worker that was told to leave just before it began to listen for leases listened for ever.
+TEST_F(FarmTest, WorkerDrainedAtAnyMomentLeaves) {
+  Farm farm(FastOptions(dir.path()));
+  FarmLink link(farm.Connect());
+  const auto registered = link.Register({"early", "test", 1, 1 << 20, SyntheticExecutor().Kinds()}, {});
+  ASSERT_TRUE(registered.ok()) << registered.status();
+  link.HangUpForGood();
+  EXPECT_TRUE(absl::IsCancelled(link.Listen(registered->worker_id, 1, [](const LeaseNews&) {})));
+  for (int i = 0; i < 100; ++i) {
+    auto& worker = farm.AddWorker(absl::StrCat("w", i));
+    std::this_thread::sleep_for(std::chrono::microseconds(50 * i));
+    worker.worker->Drain();
+    worker.thread.join();
+    EXPECT_TRUE(worker.result.ok()) << worker.result;
+  }
+  EXPECT_TRUE(WaitFor([&] { return farm.coordinator().GetStats().workers == 1; })) << "the early one";
+}
+
+// Symptom: memory that ended in the planner ended the coordinator.
+TEST_F(FarmTest, PlannerThatThrowsFailsTheCallOnly) {
+  Farm farm(FastOptions(dir.path()));
+  const auto client = farm.Client();
+  EXPECT_EQ(client->Submit(scene.Text(), {"", "", "throw", false}).status().code(),
+            absl::StatusCode::kResourceExhausted);
+  farm.AddWorker("w");
+  // In the second stage, which nobody waits for with a call.
+  const auto job = client->Submit(scene.Text(), {"", "", "throw later", false});
+  ASSERT_TRUE(job.ok()) << job.status();
+  const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->state(), v1::FAILED);
+  EXPECT_EQ(ended->reason(), "out of memory");
+  EXPECT_EQ(farm.Bake(scene).state(), v1::DONE);
+}
+
+// Symptom: a job whose graph could not be read after a restart was running for ever.
+TEST_F(FarmTest, JobThatCannotGoOnAfterARestartFails) {
+  Farm farm(FastOptions(dir.path()));
+  const auto client = farm.Client();
+  const auto job = client->Submit(scene.Text(), {});
+  ASSERT_TRUE(job.ok()) << job.status();
+  ASSERT_TRUE(farm.coordinator()
+                  .writer()
+                  .Run([&](store::Tables& tables) { return tables.InsertStage(job->job_id(), 0, "no graph"); })
+                  .ok());
+  farm.StopCoordinator();
+  farm.StartCoordinator();
+  const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->state(), v1::FAILED);
+  EXPECT_NE(ended->reason().find("submit it again"), std::string::npos) << ended->reason();
+  farm.AddWorker("w");
+  EXPECT_EQ(farm.Bake(scene).state(), v1::DONE);
+}
+
+TEST_F(FarmTest, ListedJobsHaveNoPhasesAndNoFiles) {
+  Farm farm(FastOptions(dir.path()));
+  farm.AddWorker("w");
+  const v1::Job job = farm.Bake(scene);
+  EXPECT_GT(job.phases_size(), 0);
+  const auto jobs = farm.Client()->List({}, 10);
+  ASSERT_TRUE(jobs.ok() && jobs->size() == 1u) << jobs.status();
+  EXPECT_EQ(jobs->front().phases_size() + jobs->front().artifacts_size() + jobs->front().previews_size(), 0);
+}
+
 TEST_F(FarmTest, OnceAndIdleExitEndTheWorker) {
   Farm farm(FastOptions(dir.path()));
   const auto client = farm.Client();

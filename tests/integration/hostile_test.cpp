@@ -14,14 +14,14 @@
 #include "proto/bakewell/v1/bake.grpc.pb.h"
 #include "proto/bakewell/v1/blob.grpc.pb.h"
 #include "proto/bakewell/v1/settings.pb.h"
-#include "proto/bakewell/v1/worker.pb.h"
+#include "proto/bakewell/v1/worker.grpc.pb.h"
 #include "proto/rpc/transfer.h"
 #include "proto/settings.h"
 #include "server/plan/level_planner.h"
 #include "server/rpc/refusal_log.h"
-#include "tests/support/farm.h"
+#include "tests/integration/logged_farm.h"
 #include "tests/support/peak_memory.h"
-#include "tests/support/temp_dir.h"
+#include "worker/rpc/farm_link.h"
 
 namespace bakewell::test {
 namespace {
@@ -29,36 +29,16 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-class HostileTest : public testing::Test {
- protected:
-  Farm::Options OptionsHere() {
-    Farm::Options options;
-    options.folder = dir.path() / "farm";
-    options.job.log = [this](std::string_view line) {
-      const std::lock_guard lock(mutex);
-      log.emplace_back(line);
-    };
-    return options;
-  }
-  int64_t LinesWith(const std::string& text) {
-    const std::lock_guard lock(mutex);
-    return std::count_if(log.begin(), log.end(),
-                         [&](const std::string& line) { return line.find(text) != std::string::npos; });
-  }
-
-  TempDir dir{"/dev/shm"};
-  SyntheticScene scene{4, 2, 1000, 0, 64, 1, true};
-  std::mutex mutex;
-  std::vector<std::string> log;
-};
+using HostileTest = LoggedFarm;
 
 // A method, and a message that it would take.
 struct Target {
   std::string method, valid;
 };
 
-std::vector<Target> Targets(const Digest& scene) {
-  const std::string digest = DigestToBytes(scene);
+std::string Text(const google::protobuf::MessageLite& message) { return message.SerializeAsString(); }
+
+std::vector<Target> BlobTargets(const std::string& digest) {
   v1::FindMissingRequest find;
   find.add_digests(digest);
   v1::UploadRequest upload;
@@ -67,6 +47,12 @@ std::vector<Target> Targets(const Digest& scene) {
   upload.set_data("0123456789");
   v1::DownloadRequest download;
   download.set_digest(digest);
+  return {{"BlobService/FindMissing", Text(find)},
+          {"BlobService/Upload", Text(upload)},
+          {"BlobService/Download", Text(download)}};
+}
+
+std::vector<Target> BakeTargets(const std::string& digest) {
   v1::SubmitRequest submit;
   submit.set_client_key("key");
   submit.set_scene(digest);
@@ -82,6 +68,13 @@ std::vector<Target> Targets(const Digest& scene) {
   v1::FetchRequest fetch;
   fetch.set_job_id(1);
   fetch.set_name("out");
+  return {{"BakeService/Submit", Text(submit)}, {"BakeService/Estimate", Text(submit)},
+          {"BakeService/Get", Text(get)},       {"BakeService/List", Text(list)},
+          {"BakeService/Watch", Text(watch)},   {"BakeService/Cancel", Text(cancel)},
+          {"BakeService/Fetch", Text(fetch)}};
+}
+
+std::vector<Target> WorkerTargets(const std::string& digest) {
   v1::RegisterRequest enroll;
   enroll.set_name("worker");
   enroll.set_cores(1);
@@ -106,6 +99,12 @@ std::vector<Target> Targets(const Digest& scene) {
   fail.add_missing_inputs(digest);
   v1::ReleaseRequest release;
   release.add_leases()->set_key(digest);
+  return {{"WorkerService/Register", Text(enroll)}, {"WorkerService/Lease", Text(lease)},
+          {"WorkerService/Heartbeat", Text(beat)},  {"WorkerService/Complete", Text(complete)},
+          {"WorkerService/Fail", Text(fail)},       {"WorkerService/Release", Text(release)}};
+}
+
+std::vector<Target> AdminTargets() {
   v1::DrainRequest drain;
   drain.set_worker_id(7);
   v1::SetPriorityRequest priority;
@@ -115,30 +114,19 @@ std::vector<Target> Targets(const Digest& scene) {
   quota.set_weight(1);
   v1::CollectGarbageRequest collect;
   collect.set_target_bytes(1 << 30);
-  const std::string blob = "/bakewell.v1.BlobService/", bake = "/bakewell.v1.BakeService/",
-                    work = "/bakewell.v1.WorkerService/", admin = "/bakewell.v1.AdminService/";
-  return {{blob + "FindMissing", find.SerializeAsString()},
-          {blob + "Upload", upload.SerializeAsString()},
-          {blob + "Download", download.SerializeAsString()},
-          {bake + "Submit", submit.SerializeAsString()},
-          {bake + "Estimate", submit.SerializeAsString()},
-          {bake + "Get", get.SerializeAsString()},
-          {bake + "List", list.SerializeAsString()},
-          {bake + "Watch", watch.SerializeAsString()},
-          {bake + "Cancel", cancel.SerializeAsString()},
-          {bake + "Fetch", fetch.SerializeAsString()},
-          {work + "Register", enroll.SerializeAsString()},
-          {work + "Lease", lease.SerializeAsString()},
-          {work + "Heartbeat", beat.SerializeAsString()},
-          {work + "Complete", complete.SerializeAsString()},
-          {work + "Fail", fail.SerializeAsString()},
-          {work + "Release", release.SerializeAsString()},
-          {admin + "ListWorkers", ""},
-          {admin + "Status", ""},
-          {admin + "Drain", drain.SerializeAsString()},
-          {admin + "SetPriority", priority.SerializeAsString()},
-          {admin + "SetQuota", quota.SerializeAsString()},
-          {admin + "CollectGarbage", collect.SerializeAsString()}};
+  return {{"AdminService/ListWorkers", ""},       {"AdminService/Status", ""},
+          {"AdminService/Drain", Text(drain)},    {"AdminService/SetPriority", Text(priority)},
+          {"AdminService/SetQuota", Text(quota)}, {"AdminService/CollectGarbage", Text(collect)}};
+}
+
+std::vector<Target> Targets(const Digest& scene) {
+  const std::string digest = DigestToBytes(scene);
+  std::vector<Target> targets;
+  for (const std::vector<Target>& some :
+       {BlobTargets(digest), BakeTargets(digest), WorkerTargets(digest), AdminTargets()}) {
+    for (const Target& target : some) targets.push_back({"/bakewell.v1." + target.method, target.valid});
+  }
+  return targets;
 }
 
 // Bytes keyed by `seed`: random ones, or the valid message with a few bytes changed, cut, doubled or put in.
@@ -236,6 +224,46 @@ TEST_F(HostileTest, MutatedMessagesToEveryMethodAreAnsweredAndTheServiceGoesOn) 
   EXPECT_EQ(DigestsOf(*farm.Client()->Get(before.id())), DigestsOf(before));
 }
 
+// Symptom: what a worker or client says was added, subtracted and summed up before it was looked at: overflow, which
+// the sanitizers report and which made a worker's run time negative.
+TEST_F(HostileTest, NumbersAtTheEndsOfTheirRangeAreHarmless) {
+  Farm farm(OptionsHere());
+  RawCaller caller(farm.Connect()->channel());
+  FarmLink link(farm.Connect());
+  const auto registered = link.Register({"liar", "", 1, 1 << 20, SyntheticExecutor().Kinds()}, {});
+  ASSERT_TRUE(registered.ok()) << registered.status();
+  for (const int32_t credit : {INT32_MAX, INT32_MIN}) {
+    v1::LeaseRequest lease;
+    lease.set_worker_id(registered->worker_id);
+    lease.set_add_credit(credit);
+    // The stream stays open; two messages add up.
+    const auto stub = v1::WorkerService::NewStub(farm.Connect()->channel());
+    grpc::ClientContext context;
+    const auto stream = stub->Lease(&context);
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(stream->Write(lease));
+    stream->WritesDone();
+    EXPECT_TRUE(stream->Finish().ok());
+  }
+  for (const int state : {INT32_MAX, INT32_MIN, 5}) {
+    v1::ListRequest list;
+    list.set_state(static_cast<v1::JobState>(state));
+    EXPECT_EQ(caller.Call("/bakewell.v1.BakeService/List", list.SerializeAsString()), grpc::INVALID_ARGUMENT) << state;
+  }
+  for (const int64_t run : {INT64_MIN, INT64_MAX, INT64_MAX}) {
+    ++scene.seed;
+    const auto job = farm.Client()->Submit(scene.Text(), {});
+    ASSERT_TRUE(job.ok()) << job.status();
+    const plan::BlobReader read = [&](const Digest&) -> absl::StatusOr<std::string> { return scene.Text(); };
+    const plan::PlannedTask root = SyntheticPlanner().Plan({Sha256Of(scene.Text()), ""}, read)->tasks[0];
+    ASSERT_TRUE(UploadBlob(link.connection(), Sha256Of("x"), "x").ok());
+    const absl::Status done = link.Complete(registered->worker_id, {0, root.key, root.spec, 0},
+                                            {{"out", Sha256Of("x"), 1}}, std::chrono::microseconds(run));
+    ASSERT_TRUE(done.ok()) << done;
+    EXPECT_GE(farm.Client()->Get(job->job_id())->run_us(), 0);
+    EXPECT_GE(farm.coordinator().GetStats().run_us, 0);
+  }
+}
+
 // Symptom: a second Lease stream in a worker's name took the first one's place, ended, and the worker never heard of
 // it: it waited for tasks for ever.
 TEST_F(HostileTest, WorkerWhoseStreamIsTakenComesBack) {
@@ -301,9 +329,10 @@ TEST(HostileCoordinator, ItsPackedMessagesAreRefusedByTheClient) {
   const auto server = builder.BuildAndStart();
   ConnectOptions options;
   options.address = absl::StrCat("localhost:", port);
-  FarmClient client(Connection::Open(options).value(), milliseconds(500));
+  FarmClient client(Connection::Open(options).value(), seconds(10));
   const auto job = client.Get(1);
-  EXPECT_FALSE(job.ok()) << job->reason().size();
+  ASSERT_FALSE(job.ok()) << job->reason().size();
+  EXPECT_TRUE(absl::IsInternal(job.status()) || absl::IsUnimplemented(job.status())) << job.status();
   server->Shutdown();
 }
 

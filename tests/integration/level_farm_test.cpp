@@ -18,19 +18,27 @@
 namespace bakewell::test {
 namespace {
 
+std::string SampleScene() {
+  const std::vector<std::byte> bytes =
+      SerializeScene(LoadLevel(std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb").value().scene);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+absl::StatusOr<v1::SubmitResponse> SubmitLevel(FarmClient& client, const std::string& scene,
+                                               const BakeSettings& settings) {
+  return client.Submit(scene, {"", "", ProtoFromSettings(settings).SerializeAsString(), false});
+}
+
 v1::Job BakeLevel(const std::string& scene, const BakeSettings& settings, int workers) {
   const LevelFarm farm(workers);
   FarmClient client(farm.Connect());
-  const auto submitted = client.Submit(scene, {"", "", ProtoFromSettings(settings).SerializeAsString(), false});
+  const auto submitted = SubmitLevel(client, scene, settings);
   EXPECT_TRUE(submitted.ok()) << submitted.status();
   return submitted.ok() ? *client.Watch(submitted->job_id(), [](const v1::Job&) { return true; }) : v1::Job();
 }
 
 TEST(LevelFarm, FilesAreTheSameForAnyNumberOfWorkers) {
-  const auto level = LoadLevel(std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb");
-  ASSERT_TRUE(level.ok()) << level.status();
-  const std::vector<std::byte> bytes = SerializeScene(level->scene);
-  const std::string scene(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string scene = SampleScene();
   BakeSettings settings;
   settings.quality = Quality::kPreview;
   settings.resolution = 64;
@@ -42,17 +50,14 @@ TEST(LevelFarm, FilesAreTheSameForAnyNumberOfWorkers) {
 
 // Watch says that a picture grows; Fetch gives it, and it does grow.
 TEST(LevelFarm, PagesCanBeLookedAtWhileTheyAreGathered) {
-  const auto level = LoadLevel(std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb");
-  ASSERT_TRUE(level.ok()) << level.status();
-  const std::vector<std::byte> bytes = SerializeScene(level->scene);
-  const std::string scene(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string scene = SampleScene();
   BakeSettings settings;
   settings.quality = Quality::kHigh;
   settings.resolution = 160;
   const LevelFarm farm(1);
   FarmClient client(farm.Connect());
   const TempDir dir;
-  const auto submitted = client.Submit(scene, {"", "", ProtoFromSettings(settings).SerializeAsString(), false});
+  const auto submitted = SubmitLevel(client, scene, settings);
   ASSERT_TRUE(submitted.ok()) << submitted.status();
   std::vector<int64_t> lit;  // pixels of the picture each time that it had grown
   int64_t parts = 0;
@@ -87,10 +92,7 @@ TEST(LevelFarm, PagesCanBeLookedAtWhileTheyAreGathered) {
 }
 
 TEST(LevelExecutor, StoppedPhotonsAreNoResult) {
-  const auto level = LoadLevel(std::string(BAKEWELL_SOURCE_DIR) + "/tests/scenes/sample.glb");
-  ASSERT_TRUE(level.ok()) << level.status();
-  const std::vector<std::byte> bytes = SerializeScene(level->scene);
-  const std::string scene(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string scene = SampleScene();
   BakeSettings settings;
   settings.quality = Quality::kPreview;
   settings.resolution = 32;

@@ -13,8 +13,7 @@
 #include "proto/bakewell/v1/blob.grpc.pb.h"
 #include "proto/rpc/transfer.h"
 #include "server/rpc/auth.h"
-#include "tests/support/farm.h"
-#include "tests/support/temp_dir.h"
+#include "tests/integration/logged_farm.h"
 
 namespace bakewell::test {
 namespace {
@@ -22,17 +21,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-class SecurityTest : public testing::Test {
+class SecurityTest : public LoggedFarm {
  protected:
-  Farm::Options OptionsHere() {
-    Farm::Options options;
-    options.folder = dir.path() / "farm";
-    options.job.log = [this](std::string_view line) {
-      const std::lock_guard lock(mutex);
-      log += std::string(line) + "\n";
-    };
-    return options;
-  }
   static void AddToken(Farm& farm, const std::string& token, const std::string& user, int scopes, int64_t expires_us) {
     ASSERT_TRUE(farm.coordinator()
                     .writer()
@@ -61,11 +51,6 @@ class SecurityTest : public testing::Test {
         "-CAcreateserial -days 2 -extfile ext -out s.pem 2>/dev/null"};
     for (const char* command : commands) ASSERT_EQ(std::system((in + command).c_str()), 0) << command;
   }
-
-  TempDir dir{"/dev/shm"};
-  SyntheticScene scene{4, 2, 1000, 0, 64, 1, true};
-  std::mutex mutex;
-  std::string log;
 };
 
 TEST_F(SecurityTest, TokensAreNeededOnceThereIsOneAndScopesAreKept) {
@@ -89,11 +74,10 @@ TEST_F(SecurityTest, TokensAreNeededOnceThereIsOneAndScopesAreKept) {
   const auto blob = DownloadBlob(*farm.Connect("ann-token"), Sha256Of(scene.Text()), 1000, 1);
   EXPECT_EQ(blob.status().code(), absl::StatusCode::kPermissionDenied);
   EXPECT_GE(farm.server().refused(), 5u);
-  const std::lock_guard lock(mutex);
   // The log says who was refused, and none of the secrets.
-  EXPECT_NE(log.find("UNAUTHENTICATED"), std::string::npos);
+  EXPECT_GT(LinesWith("UNAUTHENTICATED"), 0);
   for (const char* secret : {"ann-token", "bob-token", "old-token", "root-token", "wrong"}) {
-    EXPECT_EQ(log.find(secret), std::string::npos) << secret;
+    EXPECT_EQ(LinesWith(secret), 0) << secret;
   }
 }
 

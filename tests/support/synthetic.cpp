@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <new>
 #include <thread>
 
 namespace bakewell::test {
@@ -112,6 +113,7 @@ std::vector<plan::Kind> SyntheticPlanner::Kinds() const {
 absl::StatusOr<plan::TaskGraph> SyntheticPlanner::Plan(const plan::PlanRequest& request,
                                                        const plan::BlobReader& read) const {
   if (request.settings == "unknown") return absl::InvalidArgumentError("unknown settings");
+  if (request.settings == "throw") throw std::bad_alloc();
   BAKEWELL_ASSIGN_OR_RETURN(const std::string text, read(request.scene));
   BAKEWELL_ASSIGN_OR_RETURN(const SyntheticScene scene, ParseScene(text));
   plan::TaskGraph graph;
@@ -127,6 +129,7 @@ absl::StatusOr<plan::TaskGraph> SyntheticPlanner::Plan(const plan::PlanRequest& 
 absl::StatusOr<plan::TaskGraph> SyntheticPlanner::Continue(const plan::PlanRequest& request,
                                                            const std::vector<plan::TaskGraph>& so_far,
                                                            const TaskOutputs&, const plan::BlobReader& read) const {
+  if (request.settings == "throw later") throw std::bad_alloc();
   BAKEWELL_ASSIGN_OR_RETURN(const std::string text, read(request.scene));
   BAKEWELL_ASSIGN_OR_RETURN(const SyntheticScene scene, ParseScene(text));
   plan::TaskGraph graph;

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <fstream>
 #include <thread>
 
@@ -82,16 +83,23 @@ absl::Status Work(Flags flags, const MakeExecutor& make_executor) {
   BAKEWELL_ASSIGN_OR_RETURN(const auto connection, Connection::Open(flags.connect));
   const std::unique_ptr<TaskExecutor> executor = make_executor(flags.threads);
   Worker worker(connection, *executor, flags.worker);
-  // Ends with the worker: it looks for signals a few times a second.
-  std::jthread signalled([&](std::stop_token stop) {
-    const timespec wait{0, 100'000'000};
-    while (!stop.stop_requested()) {
-      if (sigtimedwait(&signals, nullptr, &wait) > 0) worker.Drain();
+  std::atomic<bool> left = false;
+  std::thread signalled([&] {
+    for (int signal = 0; !left;) {
+      if (sigwait(&signals, &signal) == 0) worker.Drain();
     }
   });
   const absl::Status status = worker.Run();
+  left = true;
+  pthread_kill(signalled.native_handle(), SIGTERM);  // nobody else wakes it
+  signalled.join();
   const WorkerCounters counters = worker.counters();
   spdlog::info("{} tasks done, {} failed, {} given back", counters.done, counters.failed, counters.given_back);
+  if (!worker.WaitForTasks(std::chrono::seconds(2))) {
+    spdlog::warn("a task that was told to stop goes on: leaving without it");
+    spdlog::shutdown();
+    std::_Exit(status.ok() ? 0 : 1);
+  }
   return status;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "core/artifact/skip.h"
@@ -41,6 +42,14 @@ struct TexelLight {
   bool valid = true;  // false: inside other geometry; light is zero and no evidence for anybody
   int direct_samples = 0, indirect_samples = 0;
 };
+
+// Variance of the luminance whose channels have these variances and err together, as those of one estimate do.
+inline double LuminanceVariance(Rgb variance) {
+  const double deviation = 0.2126 * std::sqrt(static_cast<double>(variance.x)) +
+                           0.7152 * std::sqrt(static_cast<double>(variance.y)) +
+                           0.0722 * std::sqrt(static_cast<double>(variance.z));
+  return deviation * deviation;
+}
 
 // Bakes the texels of one tile: a pure function of the scene, the cache, the options and the tile's number. Element i
 // is texel tile_begin[tile] + i.

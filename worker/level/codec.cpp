@@ -2,10 +2,9 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
-
-#include "core/base/fields.h"
 
 namespace bakewell {
 
@@ -44,13 +43,33 @@ class NumberReader {
   bool ok_ = true;
 };
 
-void Put(float value, FieldWriter& writer) { writer.Put(std::bit_cast<uint32_t>(value)); }
-void Put(int64_t value, FieldWriter& writer) { writer.Put(static_cast<uint64_t>(value)); }
-void Put(const Rgb& value, FieldWriter& writer) {
+// FieldWriter for as many, with room for all of them from the start.
+class NumberWriter {
+ public:
+  explicit NumberWriter(size_t expected_bytes) { bytes_.reserve(expected_bytes); }
+  template <typename T>
+  void Put(T value) {
+    const size_t at = bytes_.size();
+    bytes_.resize(at + sizeof(T));
+    std::memcpy(bytes_.data() + at, &value, sizeof(T));
+  }
+  void PutString(std::string_view text) {
+    Put(static_cast<uint32_t>(text.size()));
+    bytes_ += text;
+  }
+  std::string bytes() && { return std::move(bytes_); }
+
+ private:
+  std::string bytes_;
+};
+
+void Put(float value, NumberWriter& writer) { writer.Put(value); }
+void Put(int64_t value, NumberWriter& writer) { writer.Put(value); }
+void Put(const Rgb& value, NumberWriter& writer) {
   for (const float channel : {value.x, value.y, value.z}) Put(channel, writer);
 }
 template <typename T, size_t kCount>
-void Put(const std::array<T, kCount>& values, FieldWriter& writer) {
+void Put(const std::array<T, kCount>& values, NumberWriter& writer) {
   for (const T& value : values) Put(value, writer);
 }
 
@@ -71,7 +90,7 @@ void Add(const std::array<T, kCount>& from, std::array<T, kCount>& to) {
   for (size_t i = 0; i < kCount; ++i) to[i] += from[i];
 }
 
-void Put(const PhotonTotals& totals, FieldWriter& writer) {
+void Put(const PhotonTotals& totals, NumberWriter& writer) {
   Put(totals.emitted, writer);
   Put(totals.absorbed, writer);
   Put(totals.escaped, writer);
@@ -92,7 +111,7 @@ void AddTotals(NumberReader& reader, PhotonTotals& into) {
   into.cut_paths += totals.cut_paths;
 }
 
-void PutTexel(const TexelLight& light, FieldWriter& writer) {
+void PutTexel(const TexelLight& light, NumberWriter& writer) {
   Put(light.irradiance, writer);
   Put(light.sh.lambda, writer);
   Put(light.variance, writer);
@@ -124,11 +143,14 @@ TexelLight GetTexel(NumberReader& reader) {
 
 constexpr size_t kTexelBytes = 4 * (2 * (3 + 27 + 3) + 1) + 2 + 8;
 constexpr size_t kCellBytes = 4 * 6 + 4 * kVarianceGroups + 1;
+constexpr size_t kFluxBytes = 8 + 4 + sizeof(CellFlux::direct) + sizeof(CellFlux::indirect) + sizeof(CellFlux::group);
+constexpr size_t kHeadBytes = 1024;  // what precedes the texels, cells or photons, about
 
 }  // namespace
 
 std::string SerializePhotons(const PhotonMap& map) {
-  FieldWriter writer;
+  const auto hit = std::count_if(map.flux.begin(), map.flux.end(), [](const CellFlux& flux) { return flux.count > 0; });
+  NumberWriter writer(kHeadBytes + kFluxBytes * static_cast<size_t>(hit));
   Put(map.totals, writer);
   writer.Put(static_cast<uint64_t>(map.flux.size()));
   for (size_t i = 0; i < map.flux.size(); ++i) {
@@ -165,7 +187,7 @@ absl::Status AddPhotons(std::string_view bytes, PhotonMap& into) {
 }
 
 std::string SerializeCache(const RadianceCache& cache) {
-  FieldWriter writer;
+  NumberWriter writer(kHeadBytes + kCellBytes * cache.irradiance.size());
   Put(cache.photons_seen, writer);
   Put(cache.rays, writer);
   writer.Put(static_cast<uint64_t>(cache.irradiance.size()));
@@ -217,7 +239,7 @@ GatheredTiles Joined(std::span<const GatheredTiles> parts) {
 }
 
 std::string SerializeTiles(const GatheredTiles& tiles) {
-  FieldWriter writer;
+  NumberWriter writer(kHeadBytes + kTexelBytes * tiles.lights.size());
   const GatherCounters& counters = tiles.counters;
   for (const int64_t value : {counters.gather_rays, counters.shadow_rays, counters.bounce_rays, counters.validity_rays,
                               counters.filter_rays, counters.bad_samples}) {

@@ -93,7 +93,13 @@ std::string LevelSettings(const BakeSettings& settings) {
 }  // namespace
 
 LevelExecutor::LevelExecutor(const LevelExecutorOptions& options) : options_(options) {
-  if (options_.threads > 1) arena_ = std::make_unique<tbb::task_arena>(options_.threads);
+  if (options_.process_threads > 0) {
+    limit_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(options_.process_threads));
+  }
+  if (options_.threads == 1) return;
+  const FlushDenormals mode;  // TBB's threads compute in the mode in which their arena began
+  arena_ = std::make_unique<tbb::task_arena>(options_.threads);
+  arena_->initialize();
 }
 
 void LevelExecutor::Say(std::string_view phase, int64_t done, int64_t total) const {

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <atomic>
+#include <optional>
+
 #include "core/artifact/level_task.h"
 #include "core/artifact/progress.h"
 #include "worker/level/level.h"
@@ -13,6 +16,8 @@ namespace bakewell {
 struct LevelExecutorOptions {
   // Shared by the loops of all tasks that run; 1: every task has its slot's thread, and photon density TBB's.
   int threads = 1;
+  // TBB has at most as many threads in this process while the executor lives; 0: it is not limited here.
+  int process_threads = 0;
   // Hears of every tile, batch of photons and page of the one job that runs here; outlives the executor.
   Progress* progress = nullptr;
 };
@@ -55,6 +60,7 @@ class LevelExecutor final : public TaskExecutor {
   void ForEach(int count, const std::function<void(int)>& body);
 
   const LevelExecutorOptions options_;
+  std::optional<tbb::global_control> limit_;
   std::unique_ptr<tbb::task_arena> arena_;  // if there is more than one thread
   std::atomic<int64_t> photons_done_{0}, tiles_done_{0}, pages_done_{0};
   Recent<Level> levels_{2};

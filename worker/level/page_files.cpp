@@ -10,6 +10,7 @@
 
 #include "core/image/exr.h"
 #include "core/image/png.h"
+#include "worker/finish/charts.h"
 
 namespace bakewell {
 
@@ -62,6 +63,8 @@ absl::StatusOr<MadeOutputs> PageFiles(const TexelMap& map, std::span<const Texel
   for (const char* ending : {".irradiance.exr", ".png", ".sh.exr", ".variance.exr"}) {
     BAKEWELL_RETURN_IF_ERROR(Take(stem + ending, outputs));
   }
+  outputs.push_back(
+      {absl::StrCat("lightmap-", page, ".charts.json"), ChartsJson(page, SummarizeCharts(map, lights, page))});
   return outputs;
 }
 

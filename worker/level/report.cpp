@@ -75,10 +75,7 @@ void BakeTally::Count(std::span<const TexelLight> lights, const FilterCounters& 
     direct_samples_ += light.direct_samples;
     indirect_samples_ += light.indirect_samples;
     if (!light.valid) continue;
-    const double spread = 0.2126 * std::sqrt(static_cast<double>(light.variance.x)) +
-                          0.7152 * std::sqrt(static_cast<double>(light.variance.y)) +
-                          0.0722 * std::sqrt(static_cast<double>(light.variance.z));
-    variance_ += spread * spread;
+    variance_ += LuminanceVariance(light.variance);
     irradiance_ += static_cast<double>(Luminance(light.irradiance));
     ++valid_;
   }

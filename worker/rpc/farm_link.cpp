@@ -132,11 +132,15 @@ absl::Status FarmLink::Listen(uint64_t worker_id, int credit, const std::functio
   v1::LeaseRequest first;
   first.set_worker_id(worker_id);
   first.set_add_credit(credit);
-  if (stream->calls->Write(first)) {
-    {
-      const std::lock_guard lock(mutex_);
-      stream_ = stream;
-    }
+  std::unique_lock writing(stream->writing);  // what AddCredit writes comes after it
+  {
+    const std::lock_guard lock(mutex_);
+    if (hung_up_for_good_) stream->context.TryCancel();
+    stream_ = stream;
+  }
+  const bool opened = stream->calls->Write(first);
+  writing.unlock();
+  if (opened) {
     v1::LeaseResponse response;
     while (stream->calls->Read(&response)) {
       const auto& revoked = response.revoked();
@@ -148,7 +152,7 @@ absl::Status FarmLink::Listen(uint64_t worker_id, int credit, const std::functio
     stream_.reset();
   }
   // A write of AddCredit may be under way; the call ends after it.
-  const std::lock_guard writing(stream->writing);
+  writing.lock();
   return FromGrpc(stream->calls->Finish());
 }
 
@@ -167,6 +171,12 @@ void FarmLink::AddCredit(int credit) {
 
 void FarmLink::HangUp() {
   const std::lock_guard lock(mutex_);
+  if (stream_) stream_->context.TryCancel();
+}
+
+void FarmLink::HangUpForGood() {
+  const std::lock_guard lock(mutex_);
+  hung_up_for_good_ = true;
   if (stream_) stream_->context.TryCancel();
 }
 

@@ -54,20 +54,24 @@ class FarmLink {
                     const std::vector<Digest>& missing_inputs);
   absl::Status Release(uint64_t worker_id, const std::vector<std::pair<uint64_t, TaskKey>>& leases, bool goodbye);
 
-  // Opens the Lease stream with `credit`, then hands news to `take` until the stream ends; its status.
+  // Opens the Lease stream with `credit`, then hands news to `take` until the stream ends; its status. kCancelled after
+  // HangUpForGood.
   absl::Status Listen(uint64_t worker_id, int credit, const std::function<void(LeaseNews)>& take);
   // More credit for the open stream; nothing without one.
   void AddCredit(int credit);
-  // Ends Listen.
+  // Ends the Listen that is under way.
   void HangUp();
+  // Ends it, and every later one at once.
+  void HangUpForGood();
 
   const Connection& connection() const { return *connection_; }
 
  private:
   struct Stream;
   const std::shared_ptr<Connection> connection_;
-  std::mutex mutex_;  // guards stream_
+  std::mutex mutex_;  // guards what follows
   std::shared_ptr<Stream> stream_;
+  bool hung_up_for_good_ = false;
 };
 
 }  // namespace bakewell

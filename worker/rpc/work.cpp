@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/base/caught.h"
 #include "proto/rpc/transfer.h"
 #include "worker/rpc/worker.h"
 
@@ -86,13 +87,7 @@ void Worker::RunTask(const TaskPtr& task) {
       const std::lock_guard lock(mutex_);
       if (task->cancelled) return absl::CancelledError("not wanted any more");
     }
-    try {
-      return run();
-    } catch (const std::bad_alloc&) {
-      return absl::ResourceExhaustedError("out of memory");
-    } catch (const std::exception& error) {
-      return absl::InternalError(error.what());
-    }
+    return Caught(run);
   }();
   // What a task hands in that was told to stop may be a part of its result.
   if (task->stop.stop_requested()) made = absl::CancelledError("stopped");
@@ -221,21 +216,24 @@ void Worker::Deliver(const TaskPtr& task) {
   // Before anybody hears of the result: the task that needs it may be leased to this worker at once.
   for (size_t i = 0; i < outputs.size(); ++i) cache_.Put(outputs[i].digest, blobs[i]);
   auto pause = std::chrono::milliseconds(50);
+  absl::StatusCode outage = absl::StatusCode::kOk;  // said once, not at every try
   for (;;) {
     const absl::Status status = TryDeliver(task, outputs, blobs);
     if (IsFinal(status)) {
       if (!status.ok()) options_.log(absl::StrCat("result refused: ", status.ToString()));
+      const std::lock_guard lock(mutex_);
+      (status.ok() ? counters_.done : counters_.failed) += 1;
       break;
     }
+    if (status.code() != outage) {
+      options_.log(absl::StrCat("a result of ", task->lease.spec.kind, " is tried again: ", status.ToString()));
+    }
+    outage = status.code();
     if (options_.undelivered) options_.undelivered(status);
     Pause(pause);
     pause = std::min(pause * 2, std::chrono::milliseconds(2000));
     const std::lock_guard lock(mutex_);
     if (ended_) return;
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    ++counters_.done;
   }
   Forget(task);
 }

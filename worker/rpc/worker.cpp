@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "proto/rpc/transfer.h"
 
@@ -53,7 +54,7 @@ Worker::~Worker() {
     ended_ = draining_ = true;
     for (const auto& [key, task] : tasks_) task->stop.request_stop();
   }
-  link_.HangUp();
+  link_.HangUpForGood();
   changed_.notify_all();
   for (std::thread& thread : threads_) thread.join();
 }
@@ -75,6 +76,11 @@ void Worker::Drain() {
     draining_ = true;
   }
   changed_.notify_all();
+}
+
+bool Worker::WaitForTasks(std::chrono::milliseconds limit) {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, limit, [this] { return running_ == 0; });
 }
 
 int Worker::FreeCredit() const {
@@ -168,12 +174,8 @@ absl::Status Worker::Session() {
 absl::Status Worker::Run() {
   // Leaving is decided beside the stream, which only ends when somebody hangs up.
   std::thread leaver([this] {
-    while (!ShouldLeave()) {
-      std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, std::chrono::milliseconds(50),
-                        [this] { return ended_ || (draining_ && tasks_.empty()); });
-    }
-    link_.HangUp();
+    WaitToLeave();
+    link_.HangUpForGood();
   });
   absl::Status refusal;
   absl::StatusCode outage = absl::StatusCode::kOk;  // said once, not at every try
@@ -194,30 +196,49 @@ absl::Status Worker::Run() {
     const std::lock_guard lock(mutex_);
     ended_ = !refusal.ok() || ended_;
   }
+  changed_.notify_all();
   leaver.join();
   Leave();
   return refusal;
 }
 
-// Whether there is nothing left to wait for.
+void Worker::WaitToLeave() {
+  std::unique_lock lock(mutex_);
+  while (!ShouldLeaveLocked()) {
+    // What is to come by itself is the end of the grace, or of the patience without a task; all else is notified.
+    if (draining_)
+      changed_.wait_until(lock, drain_at_ + options_.grace);
+    else if (options_.idle_exit.count() > 0 && tasks_.empty())
+      changed_.wait_until(lock, idle_since_ + options_.idle_exit);
+    else
+      changed_.wait(lock);
+  }
+}
+
 bool Worker::ShouldLeave() {
   const std::lock_guard lock(mutex_);
+  return ShouldLeaveLocked();
+}
+
+// Whether there is nothing left to wait for.
+bool Worker::ShouldLeaveLocked() {
   if (ended_) return true;
   const auto now = Clock::now();
   const bool had_one = options_.once && counters_.done + counters_.failed > 0;
-  const bool idle = options_.idle_exit.count() > 0 && tasks_.empty() && now - idle_since_ > options_.idle_exit;
+  const bool idle = options_.idle_exit.count() > 0 && tasks_.empty() && now - idle_since_ >= options_.idle_exit;
   if (!draining_ && (had_one || idle)) {
     draining_ = true;
     drain_at_ = now;
   }
   if (!draining_) return false;
   GiveBackQueued();
-  return tasks_.empty() || now - drain_at_ > options_.grace;
+  return tasks_.empty() || now - drain_at_ >= options_.grace;
 }
 
 void Worker::GiveBackQueued() {
-  for (const TaskPtr& task : queue_) task->cancelled = true;
-  changed_.notify_all();
+  bool any = false;
+  for (const TaskPtr& task : queue_) any |= !std::exchange(task->cancelled, true);
+  if (any) changed_.notify_all();
 }
 
 // Says goodbye; the coordinator takes back whatever is still held.
@@ -241,10 +262,15 @@ void Worker::HeartbeatLoop() {
   Clock::time_point beat{};
   std::unique_lock lock(mutex_);
   while (!ended_) {
-    // Short waits, since a registration may ask for faster heartbeats than were in force before.
-    changed_.wait_for(lock, std::min<std::chrono::microseconds>(heartbeat_, std::chrono::milliseconds(100)),
-                      [this] { return ended_; });
-    if (ended_ || worker_id_ == 0 || Clock::now() - beat < heartbeat_) continue;
+    // A registration, which may ask for other heartbeats, is notified.
+    if (worker_id_ == 0) {
+      changed_.wait(lock);
+      continue;
+    }
+    if (Clock::now() < beat + heartbeat_) {
+      changed_.wait_until(lock, beat + heartbeat_);
+      continue;
+    }
     beat = Clock::now();
     const uint64_t id = worker_id_;
     lock.unlock();

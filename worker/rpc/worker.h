@@ -52,6 +52,8 @@ class Worker {
   absl::Status Run();
   // Asks Run() to return: what runs may finish within the grace. Safe from any thread, not from a signal handler.
   void Drain();
+  // Whether every task has returned by then; after Run(). The destructor waits for them, however long they take.
+  bool WaitForTasks(std::chrono::milliseconds limit);
   WorkerCounters counters() const;
 
  private:
@@ -87,7 +89,9 @@ class Worker {
   void Refill();
   void Deliver(const TaskPtr& task);
   absl::Status TryDeliver(const TaskPtr& task, const TaskOutputs& outputs, const std::vector<Blob>& blobs);
+  void WaitToLeave();
   bool ShouldLeave();
+  bool ShouldLeaveLocked();
   void GiveBackQueued();
   void Leave();
   uint64_t WorkerId() const;

@@ -2,6 +2,7 @@
 
 #include <embree3/rtcore.h>
 #include <immintrin.h>
+#include <tbb/task_arena.h>
 
 #include <cstring>
 #include <limits>
@@ -163,14 +164,17 @@ void World::AddGeometry(Geometry geometry_id) {
 }
 
 absl::Status World::BuildDevice() {
-  device_->device = rtcNewDevice("threads=1,isa=avx2");
+  device_->device = rtcNewDevice("isa=avx2");
   if (!device_->device) return absl::InternalError("Embree cannot start: this processor has no AVX2");
   device_->scene = rtcNewScene(device_->device);
   rtcSetSceneFlags(device_->scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(device_->scene, RTC_BUILD_QUALITY_MEDIUM);
   AddGeometry(kStops);
   AddGeometry(kAsks);
-  rtcCommitScene(device_->scene);
+  // One thread builds, so that the same scene has the same tree. Embree's own "threads=1" would hold all of TBB to one
+  // thread for as long as the process lives.
+  tbb::task_arena one_thread(1);
+  one_thread.execute([this] { rtcCommitScene(device_->scene); });
   if (rtcGetDeviceError(device_->device) != RTC_ERROR_NONE) {
     return absl::ResourceExhaustedError("Embree could not build its tree: not enough memory for this scene");
   }

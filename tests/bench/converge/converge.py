@@ -84,13 +84,22 @@ class Scene:
 
 
 def run(command, level, folder, options):
-    words = [os.environ.get("BAKEWELL_PROGRAM", PROGRAM), command, level, "-o", folder, "--uv", "keep"] + options
+    done = bakewell(command, level, "-o", folder, "--uv", "keep", *options)
+    return {"cpu_s": sum(phase["cpu_seconds"] for phase in done["phases"]), "rays": done["rays"], "estimated": done["estimated_error"]}
+
+
+def bakewell(*words):
+    """Runs the program; what it says when it is done (the last line of --json)."""
+    words = [os.environ.get("BAKEWELL_PROGRAM", PROGRAM), *words, "--json"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        sys.exit(" ".join(words) + "\n" + done.stderr)
-    statistics = json.load(open(os.path.join(folder, "manifest.json"), encoding="utf-8"))["statistics"]
-    cpu = sum(phase["cpu_seconds"] for phase in statistics["phases"])
-    return {"cpu_s": cpu, "rays": statistics["rays"], "estimated": statistics["estimated_error"]}
+        sys.exit(" ".join(words) + "\n" + done.stdout[-2000:] + done.stderr)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def statistics_of(folder):
+    with open(os.path.join(folder, "manifest.json"), encoding="utf-8") as file:
+        return json.load(file)["statistics"]
 
 
 def measure(scene, label, command, options, keep=None):

@@ -55,14 +55,11 @@ def hall(count):
 
 
 def bake(level, folder, samples):
-    words = [os.environ.get("BAKEWELL_PROGRAM", converge.PROGRAM), "bake", level, "-o", folder, "--texels-per-metre", "2", "--no-filter",
-             "--target-error", "1e-9", "--samples", str(samples), "--photons", "500000"]
-    subprocess.run(words, check=True, capture_output=True)
-    with open(os.path.join(folder, "manifest.json"), encoding="utf-8") as file:
-        statistics = json.load(file)["statistics"]
+    done = converge.bakewell("bake", level, "-o", folder, "--texels-per-metre", "2", "--no-filter",
+                             "--target-error", "1e-9", "--samples", str(samples), "--photons", "500000")
     image = converge.load(os.path.join(folder, "lightmap-0.irradiance.exr"))
-    gather = next(p["cpu_seconds"] for p in statistics["phases"] if p["phase"] == "gather")
-    return gather, statistics, image
+    gather = next(p["cpu_seconds"] for p in done["phases"] if p["phase"] == "gather")
+    return gather, converge.statistics_of(folder), image
 
 
 def main():

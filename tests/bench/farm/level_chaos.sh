@@ -50,7 +50,7 @@ while [[ $done_kills -lt $kills ]] && kill -0 "$client" 2>/dev/null; do
 done
 wait "$client" || { cat "$dir/submit.out" "$dir/server.log"; echo "the job failed after $done_kills kills"; exit 1; }
 for file in "$dir"/quiet/*; do
-  [[ "$(basename "$file")" == manifest.json ]] || cmp "$file" "$dir/out/$(basename "$file")"
+  cmp "$file" "$dir/out/$(basename "$file")"
 done
 [[ -z "$(ls "$dir/data/incoming")" ]] || { echo "temporary files are left"; exit 1; }
 echo "$done_kills kills while $(basename "$scene") baked: every file as in the quiet bake"

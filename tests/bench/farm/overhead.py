@@ -3,9 +3,11 @@
 
 overhead.py BIN_DIR SCENE [--quality high] [--resolution 256] [--runs 3]. CPU time is user and system time of all
 processes (getrusage of the ended children). The three take turns; the table has medians, and the median of the ratios
-to the bare kernels of the same turn. Fails where the files differ.
+to the bare kernels of the same turn. With --together the three of a turn run at the same time: what else the machine
+does then slows them alike, and their ratio is less of a lottery. Fails where the files differ.
 """
 import argparse
+import concurrent.futures
 import datetime
 import filecmp
 import os
@@ -13,6 +15,7 @@ import pathlib
 import signal
 import statistics
 import subprocess
+import sys
 import tempfile
 
 PORT = int(os.environ.get("BAKEWELL_BENCH_PORT", "17741"))
@@ -73,13 +76,16 @@ def main():
     parser.add_argument("--quality", default="high")
     parser.add_argument("--resolution", type=int, default=0, help="0: the scene's")
     parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--together", action="store_true")
     args = parser.parse_args()
     ways = {"bare kernels": bare, "bake": embedded, "server and 2 workers": farm}
     cpu = {name: [] for name in ways}
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(args.runs):
-            for name, way in ways.items():
-                cpu[name].append(way(args, pathlib.Path(folder) / name.replace(" ", "-")))
+            with concurrent.futures.ThreadPoolExecutor(len(ways) if args.together else 1) as turn:
+                done = {name: turn.submit(way, args, pathlib.Path(folder) / name.replace(" ", "-")) for name, way in ways.items()}
+            for name, seconds in done.items():
+                cpu[name].append(seconds.result())
         first = pathlib.Path(folder) / "bare-kernels"
         for name in list(ways)[1:]:
             for file in sorted(first.iterdir()):
@@ -89,6 +95,8 @@ def main():
                             cwd=pathlib.Path(__file__).parent).stdout.strip()
     print(f"| {args.scene.stem} {args.quality}, {args.runs} runs, {commit}, {datetime.date.today()} | CPU s, median (min) | to bare |")
     print("|---|---|---|")
+    for name in ways:
+        print(f"{name}:", " ".join(f"{seconds:.2f}" for seconds in cpu[name]), file=sys.stderr)
     for name in ways:
         ratio = statistics.median(a / b for a, b in zip(cpu[name], cpu["bare kernels"]))
         print(f"| {name} | {statistics.median(cpu[name]):.2f} ({min(cpu[name]):.2f}) | {ratio:.3f} |")

@@ -25,16 +25,11 @@ PHASES = ("load", "chart", "texels", "photons", "density", "gather", "finish", "
 def bake(level, samples, photons_per_texel, texels_hint, options=()):
     """One row: CPU seconds by phase, rays, peak memory of the process."""
     with tempfile.TemporaryDirectory() as folder:
-        words = [os.environ.get("BAKEWELL_PROGRAM", converge.PROGRAM), "bake", level, "-o", folder, "--target-error", "1e-9", "--samples", str(samples),
-                 "--photons", str(max(1024, int(photons_per_texel * texels_hint))), *options]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            sys.exit(" ".join(words) + "\n" + done.stderr)
-        with open(os.path.join(folder, "manifest.json"), encoding="utf-8") as file:
-            statistics = json.load(file)["statistics"]
-    counters = statistics["counters"]
-    return {"cpu_s": {p["phase"]: p["cpu_seconds"] for p in statistics["phases"]}, "texels": counters["texels/covered"], "rays": statistics["rays"],
-            "traversed": counters["gather/rays"] + counters["gather/shadow_rays"] + counters["gather/bounce_rays"], "peak_mb": statistics["peak_memory_bytes"] / 2**20}
+        done = converge.bakewell("bake", level, "-o", folder, "--target-error", "1e-9", "--samples", str(samples),
+                                 "--photons", str(max(1024, int(photons_per_texel * texels_hint))), *options)
+        counters = converge.statistics_of(folder)["counters"]
+    return {"cpu_s": {p["phase"]: p["cpu_seconds"] for p in done["phases"]}, "texels": counters["texels/covered"], "rays": done["rays"],
+            "traversed": counters["gather/rays"] + counters["gather/shadow_rays"] + counters["gather/bounce_rays"], "peak_mb": done["peak_memory_bytes"] / 2**20}
 
 
 def rows_of(axis, samples):

@@ -31,6 +31,8 @@ BakeSummary TwoFiles() {
   summary.warnings = {"no normals"};
   summary.estimated_error = 0.008;
   summary.rays = 2500000;
+  summary.phases = {{"chart", 1, 2}, {"gather", 3, 5}};
+  summary.peak_memory_bytes = 4096;
   return summary;
 }
 

@@ -22,6 +22,7 @@ class StoreTest : public testing::Test {
     auto database = OpenDatabase(dir.path() / "farm.db");
     ASSERT_TRUE(database.ok()) << database.status();
     writer = std::make_unique<Writer>(std::make_unique<Tables>(std::move(*database)));
+    blobs.reset();
     auto opened = BlobStore::Open(dir.path(), 0);
     ASSERT_TRUE(opened.ok()) << opened.status();
     blobs = std::move(*opened);
@@ -47,6 +48,29 @@ class StoreTest : public testing::Test {
   std::unique_ptr<Writer> writer;
   std::unique_ptr<BlobStore> blobs;
 };
+
+// Symptom: two servers on one folder, on different ports, deleted each other's uploads and leased the same tasks.
+TEST_F(StoreTest, FolderHasOneServerAtATime) {
+  auto one = BlobStore::Open(dir.path(), 0);
+  ASSERT_TRUE(one.ok()) << one.status();
+  EXPECT_TRUE(absl::IsFailedPrecondition(BlobStore::Open(dir.path(), 0).status()));
+  one->reset();
+  EXPECT_TRUE(BlobStore::Open(dir.path(), 0).ok());
+}
+
+// Symptom: uploads at a time were held against the quota one by one, and went above it together.
+TEST_F(StoreTest, UploadsAtATimeKeepTheQuotaTogether) {
+  const auto quota = BlobStore::Open(dir.path(), 1000).value();
+  const std::string bytes(600, 'x');
+  const auto one = quota->StartUpload(Sha256Of(bytes), 600), other = quota->StartUpload(Sha256Of(bytes), 600);
+  ASSERT_TRUE(one.ok() && other.ok()) << "nothing has come yet";
+  EXPECT_TRUE((*one)->Append(bytes).ok());
+  EXPECT_TRUE(absl::IsResourceExhausted((*other)->Append(bytes)));
+  EXPECT_TRUE(absl::IsResourceExhausted(quota->StartUpload(Sha256Of("y"), 401).status()));
+  EXPECT_TRUE((*one)->Finish().ok());
+  EXPECT_EQ(quota->total_bytes(), 600);
+  EXPECT_TRUE(quota->Put(Sha256Of(std::string(400, 'z')), std::string(400, 'z')).ok()) << "what failed counts no more";
+}
 
 TEST_F(StoreTest, NewerDatabaseIsRefusedAndUntouched) {
   OpenAll();
@@ -261,7 +285,8 @@ TEST_F(StoreTest, ResumedDownloadIsVerifiedAsAWhole) {
 
 TEST_F(StoreTest, QuotaIsKept) {
   OpenAll();
-  blobs = std::move(*BlobStore::Open(dir.path(), 8));
+  blobs.reset();
+  blobs = BlobStore::Open(dir.path(), 8).value();
   EXPECT_TRUE(blobs->Put(Sha256Of("12345"), "12345").ok());
   EXPECT_EQ(blobs->Put(Sha256Of("6789"), "6789").code(), absl::StatusCode::kResourceExhausted);
 }

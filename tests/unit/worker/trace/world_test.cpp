@@ -1,8 +1,14 @@
 #include "worker/trace/world.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
+#include <atomic>
+#include <chrono>
 #include <limits>
+#include <thread>
 
 #include "tests/support/scene_builder.h"
 #include "tests/support/statistics.h"
@@ -27,6 +33,27 @@ std::unique_ptr<World> Build(const Scene& scene, BackfaceMode mode = BackfaceMod
 
 Ray Down(float x, float y, uint32_t key = 0) { return {{x, y, 1}, {0, 0, -1}, kInfinity, key}; }
 Ray Up(float x, float y) { return {{x, y, -1}, {0, 0, 1}, kInfinity, 0}; }
+
+// Symptom: bakes used one thread for each of two tasks, however many cores there were: Embree, told to use one thread,
+// had told all of TBB.
+TEST(World, LeavesTbbItsThreads) {
+  const auto world = Build(Square({}));
+  const tbb::global_control two(tbb::global_control::max_allowed_parallelism, 2);
+  tbb::task_arena arena(2);
+  std::atomic<int> there{0};
+  // Each of the two waits for the other, which one thread alone does in vain.
+  arena.execute([&] {
+    tbb::parallel_for(
+        0, 2,
+        [&](int) {
+          ++there;
+          const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+          while (there < 2 && std::chrono::steady_clock::now() < until) std::this_thread::yield();
+          EXPECT_EQ(there, 2);
+        },
+        tbb::simple_partitioner());
+  });
+}
 
 TEST(World, HitTellsTriangleDistanceBarycentricsAndSide) {
   const Scene scene = Square({});
