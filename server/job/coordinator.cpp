@@ -27,6 +27,18 @@ void FillDefaults(Options& options) {
 
 constexpr auto kTick = std::chrono::milliseconds(100);
 
+// Nobody waits for ever for a job that is in the database and cannot run.
+absl::Status FailUnrecovered(store::JobRow row, const absl::Status& why, int64_t now_us, store::Writer& writer) {
+  row.state = store::JobState::kFailed;
+  row.reason = absl::StrCat("it could not go on after a restart; submit it again: ", std::string(why.message()));
+  row.code = static_cast<int>(why.code());
+  row.finished_us = now_us;
+  return writer.Run([&](store::Tables& tables) -> absl::Status {
+    BAKEWELL_RETURN_IF_ERROR(tables.UpdateJob(row));
+    return tables.DeleteStages(row.id);
+  });
+}
+
 }  // namespace
 
 struct Coordinator::Parts {
@@ -116,21 +128,9 @@ absl::Status Coordinator::Recover() {
     const absl::Status status = Caught([&] { return RecoverJob(row); });
     if (status.ok()) continue;
     options_.log(absl::StrCat("job ", row.id, " cannot go on: ", status.ToString()));
-    BAKEWELL_RETURN_IF_ERROR(FailUnrecovered(row, status));
+    BAKEWELL_RETURN_IF_ERROR(FailUnrecovered(row, status, WallNowUs(), *writer_));
   }
   return absl::OkStatus();
-}
-
-// Nobody waits for a job for ever that is in the database and cannot run.
-absl::Status Coordinator::FailUnrecovered(store::JobRow row, const absl::Status& why) {
-  row.state = store::JobState::kFailed;
-  row.reason = absl::StrCat("it could not go on after a restart; submit it again: ", std::string(why.message()));
-  row.code = static_cast<int>(why.code());
-  row.finished_us = WallNowUs();
-  return writer_->Run([&](store::Tables& tables) -> absl::Status {
-    BAKEWELL_RETURN_IF_ERROR(tables.UpdateJob(row));
-    return tables.DeleteStages(row.id);
-  });
 }
 
 absl::Status Coordinator::RecoverJob(const store::JobRow& row) {

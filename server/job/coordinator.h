@@ -82,7 +82,6 @@ class Coordinator {
   Coordinator(Options options, const plan::Planner& planner, Parts parts);
   sched::Time Now() const { return options_.steady_now(); }
 
-  absl::Status CheckWritable() const;
   absl::Status CheckRequest(const SubmitRequest& request);
   absl::Status CheckQuota(const SubmitRequest& request, const store::AccountRow& account);
   absl::StatusOr<store::AccountRow> AccountOf(const std::string& user);
@@ -97,7 +96,6 @@ class Coordinator {
   absl::Status ContinueJob(int64_t id);
   absl::Status Recover();
   absl::Status RecoverJob(const store::JobRow& row);
-  absl::Status FailUnrecovered(store::JobRow row, const absl::Status& why);
   JobView ViewOf(const Job& job) const;
   TaskOutputs ArtifactsOf(const Job& job) const;
   void EndJob(int64_t id, store::JobState state, const absl::Status& reason, Done done);

@@ -208,7 +208,7 @@ absl::Status Coordinator::Cancel(int64_t id) {
 
 absl::Status Coordinator::SetPriority(int64_t id, int priority) {
   if (priority < 0 || priority > 1000) return absl::InvalidArgumentError("a priority is from 0 to 1000");
-  BAKEWELL_RETURN_IF_ERROR(CheckWritable());
+  BAKEWELL_RETURN_IF_ERROR(writer_->Stuck());
   store::JobRow row;
   {
     const Lock lock(mutex_);
@@ -223,7 +223,7 @@ absl::Status Coordinator::SetPriority(int64_t id, int priority) {
 }
 
 absl::Status Coordinator::SetAccount(const store::AccountRow& account) {
-  BAKEWELL_RETURN_IF_ERROR(CheckWritable());
+  BAKEWELL_RETURN_IF_ERROR(writer_->Stuck());
   return writer_->Run([&](store::Tables& tables) { return tables.PutAccount(account); });
 }
 

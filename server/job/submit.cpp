@@ -21,13 +21,6 @@ std::chrono::microseconds Scaled(std::chrono::microseconds time, double factor) 
 
 }  // namespace
 
-// While a full disk is waited for, who asks for more is told so, and does not wait on one of the few io threads.
-absl::Status Coordinator::CheckWritable() const {
-  const absl::Status trouble = writer_->Stuck();
-  if (trouble.ok()) return trouble;
-  return absl::UnavailableError(absl::StrCat("nothing can be written now: ", std::string(trouble.message())));
-}
-
 absl::Status Coordinator::CheckRequest(const SubmitRequest& request) {
   if (!IsPlainName(request.client_key)) {
     return absl::InvalidArgumentError("client_key must be 1 to 64 of [A-Za-z0-9_.-]");
@@ -146,7 +139,7 @@ absl::StatusOr<SubmitResult> Coordinator::Submit(const SubmitRequest& request) {
   };
   BAKEWELL_ASSIGN_OR_RETURN(const auto same, find_same());
   if (same) return SameJob(*same, request);
-  BAKEWELL_RETURN_IF_ERROR(CheckWritable());
+  BAKEWELL_RETURN_IF_ERROR(writer_->Stuck());
   BAKEWELL_ASSIGN_OR_RETURN(const store::AccountRow account, AccountOf(request.user));
   BAKEWELL_RETURN_IF_ERROR(CheckQuota(request, account));
 

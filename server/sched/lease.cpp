@@ -208,8 +208,9 @@ Completion Scheduler::Complete(TaskId id, LeaseToken token, Time now) {
     const Time took = std::max(Time(1), now - lease->second.start);
     const int capability = classes_[task.class_index].capability;
     const double ratio = static_cast<double>(took.count()) / static_cast<double>(task.cost.count());
-    const double before = SpeedRatio(capability);
-    SetSpeedRatio(capability, before + 0.1 * (std::min(ratio, 100.0) - before));
+    // The first one is believed: on a machine that others use too, everything takes longer, and is no straggler.
+    const double before = SpeedRatio(capability), share = before == 1.0 ? 1.0 : 0.1;
+    SetSpeedRatio(capability, before + share * (std::min(ratio, 100.0) - before));
     if (jobs_.contains(lease->second.charged_to)) ready_.Charge(lease->second.charged_to, took - lease->second.charged);
     by = lease->second.worker;
     workers_.at(by).failures_in_a_row = 0;

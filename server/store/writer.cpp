@@ -1,5 +1,7 @@
 #include "server/store/writer.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <chrono>
 #include <future>
 
@@ -46,6 +48,12 @@ absl::Status Writer::Run(Work work) {
 absl::Status Writer::Trouble() const {
   const std::lock_guard lock(mutex_);
   return trouble_;
+}
+
+absl::Status Writer::Stuck() const {
+  const absl::Status trouble = Trouble();
+  if (trouble.ok() || backlog() == 0) return absl::OkStatus();
+  return absl::UnavailableError(absl::StrCat("nothing can be written now: ", std::string(trouble.message())));
 }
 
 std::vector<Writer::Item> Writer::TakeBatch() {

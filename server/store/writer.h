@@ -39,8 +39,8 @@ class Writer {
   uint64_t works() const { return works_.load(std::memory_order_relaxed); }
   // Why nothing can be written now; OK if it can.
   absl::Status Trouble() const;
-  // Why what was submitted is tried again and again; OK if nothing waits.
-  absl::Status Stuck() const { return backlog() > 0 ? Trouble() : absl::OkStatus(); }
+  // kUnavailable while what was submitted is tried again and again: who asks for more need not wait on a thread.
+  absl::Status Stuck() const;
 
  private:
   struct Item {

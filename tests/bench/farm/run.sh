@@ -18,7 +18,9 @@ echo "# as fast as it goes, empty database"
 echo "# as fast as it goes, a million finished tasks"
 "$bin/farm_load" "$data/past" --seconds "$seconds" --run-ms 0 --workers 200 --known 1000000
 echo "# CPU time beside the bare kernels"
-python3 "$root/tests/bench/farm/overhead.py" "$bin" "$root/../shared/reference/scenes/office.glb" --quality high
+python3 "$root/tests/bench/farm/overhead.py" "$bin" "$root/../shared/reference/scenes/office.glb" --quality high --resolution 192 --together
+echo "# farms of several sizes"
+"$root/tests/bench/farm/same_bytes.sh" "$bin" "$root/tests/scenes/sample.glb" "1 2 8" --quality medium --resolution 128
 echo "# chaos"
 BAKEWELL_CHAOS_KILLS=100 "$bin/fault_farm" --gtest_filter='Chaos.*'
 "$root/tests/bench/farm/level_chaos.sh" "$bin" "$root/tests/scenes/sample.glb" 100 --quality high --resolution 256

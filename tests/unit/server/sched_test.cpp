@@ -404,6 +404,23 @@ TEST_F(SchedulerTest, TokensRiseOverARestart) {
   EXPECT_GT(after.last_token(), before);
 }
 
+// Symptom: on a machine that others use too the last tasks of each stage were run twice, since they took longer than
+// planned, as all the tasks before them had.
+TEST_F(SchedulerTest, SlowMachineMakesNoStragglers) {
+  AddWorkers();
+  scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
+  for (int i = 0; i < 3; ++i) Add(kJob);
+  const Grant first = One(kAnn), second = One(kBob);
+  now += seconds(10);
+  scheduler.Complete(first.task, first.token, now);
+  scheduler.Complete(second.task, second.token, now);
+  One(kAnn);
+  now += seconds(9);
+  EXPECT_TRUE(None(kBob));
+  now += seconds(12);
+  EXPECT_EQ(scheduler.Lease(kBob, 1, now).size(), 1u) << "twice as long as the others is long";
+}
+
 TEST_F(SchedulerTest, MeasuredRunTimeSetsTheExpectation) {
   AddWorkers();
   scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
