@@ -208,7 +208,6 @@ absl::Status Coordinator::Cancel(int64_t id) {
 
 absl::Status Coordinator::SetPriority(int64_t id, int priority) {
   if (priority < 0 || priority > 1000) return absl::InvalidArgumentError("a priority is from 0 to 1000");
-  BAKEWELL_RETURN_IF_ERROR(writer_->Stuck());
   store::JobRow row;
   {
     const Lock lock(mutex_);
@@ -219,12 +218,11 @@ absl::Status Coordinator::SetPriority(int64_t id, int priority) {
     job->second.changed = true;
     row = job->second.row;
   }
-  return writer_->Run([&](store::Tables& tables) { return tables.UpdateJob(row); });
+  return writer_->TryRun([&](store::Tables& tables) { return tables.UpdateJob(row); });
 }
 
 absl::Status Coordinator::SetAccount(const store::AccountRow& account) {
-  BAKEWELL_RETURN_IF_ERROR(writer_->Stuck());
-  return writer_->Run([&](store::Tables& tables) { return tables.PutAccount(account); });
+  return writer_->TryRun([&](store::Tables& tables) { return tables.PutAccount(account); });
 }
 
 absl::StatusOr<std::vector<store::FailureRow>> Coordinator::Failures(int64_t job, int limit) {

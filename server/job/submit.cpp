@@ -139,7 +139,6 @@ absl::StatusOr<SubmitResult> Coordinator::Submit(const SubmitRequest& request) {
   };
   BAKEWELL_ASSIGN_OR_RETURN(const auto same, find_same());
   if (same) return SameJob(*same, request);
-  BAKEWELL_RETURN_IF_ERROR(writer_->Stuck());
   BAKEWELL_ASSIGN_OR_RETURN(const store::AccountRow account, AccountOf(request.user));
   BAKEWELL_RETURN_IF_ERROR(CheckQuota(request, account));
 
@@ -165,7 +164,7 @@ absl::StatusOr<SubmitResult> Coordinator::Submit(const SubmitRequest& request) {
   }
   std::vector<std::string> graphs;
   for (const Stage& stage : stages) graphs.push_back(plan::SerializeGraph(stage.graph));
-  const absl::Status written = writer_->Run([&](store::Tables& tables) -> absl::Status {
+  const absl::Status written = writer_->TryRun([&](store::Tables& tables) -> absl::Status {
     BAKEWELL_RETURN_IF_ERROR(tables.InsertJob(row).status());
     for (size_t i = 0; i < graphs.size(); ++i) {
       BAKEWELL_RETURN_IF_ERROR(tables.InsertStage(row.id, static_cast<int64_t>(i), graphs[i]));

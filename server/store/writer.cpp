@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <chrono>
 #include <future>
 
@@ -30,12 +31,14 @@ Writer::~Writer() {
   thread_.join();
 }
 
-void Writer::Submit(Work work, Done done) {
+void Writer::Submit(Work work, Done done) { Enqueue({std::move(work), std::move(done), {}}); }
+
+void Writer::Enqueue(Item item) {
   {
     const std::lock_guard lock(mutex_);
-    queue_.push_back({std::move(work), std::move(done), {}});
+    queue_.push_back(std::move(item));
+    backlog_.fetch_add(1, std::memory_order_relaxed);
   }
-  backlog_.fetch_add(1, std::memory_order_relaxed);
   wake_.notify_one();
 }
 
@@ -45,15 +48,15 @@ absl::Status Writer::Run(Work work) {
   return promise.get_future().get();
 }
 
+absl::Status Writer::TryRun(Work work) {
+  std::promise<absl::Status> promise;
+  Enqueue({std::move(work), [&](const absl::Status& status) { promise.set_value(status); }, {}, false});
+  return promise.get_future().get();
+}
+
 absl::Status Writer::Trouble() const {
   const std::lock_guard lock(mutex_);
   return trouble_;
-}
-
-absl::Status Writer::Stuck() const {
-  const absl::Status trouble = Trouble();
-  if (trouble.ok() || backlog() == 0) return absl::OkStatus();
-  return absl::UnavailableError(absl::StrCat("nothing can be written now: ", std::string(trouble.message())));
 }
 
 std::vector<Writer::Item> Writer::TakeBatch() {
@@ -79,6 +82,16 @@ void Writer::Loop() {
   }
 }
 
+size_t Writer::TurnAway(std::vector<Item>& items, const absl::Status& why) {
+  const auto refused = std::stable_partition(items.begin(), items.end(), [](const Item& item) { return item.patient; });
+  for (auto item = refused; item != items.end(); ++item) {
+    item->done(absl::UnavailableError(absl::StrCat("nothing can be written now: ", std::string(why.message()))));
+  }
+  const auto count = static_cast<size_t>(items.end() - refused);
+  items.erase(refused, items.end());
+  return count;
+}
+
 void Writer::WriteBatch(std::vector<Item>& batch) {
   for (;;) {
     const absl::Status status = TryBatch(batch);
@@ -90,6 +103,8 @@ void Writer::WriteBatch(std::vector<Item>& batch) {
       for (Item& item : batch) item.result = status;
       break;
     }
+    backlog_.fetch_sub(TurnAway(batch, status) + TurnAway(queue_, status), std::memory_order_relaxed);
+    if (batch.empty()) return;
     wake_.wait_for(lock, kRetryPause, [this] { return stopping_; });
   }
   commits_.fetch_add(1, std::memory_order_relaxed);

@@ -30,8 +30,10 @@ class Writer {
   ~Writer();
 
   void Submit(Work work, Done done = {});
-  // Submits and waits; for start-up, tests and tools.
+  // Submits and waits.
   absl::Status Run(Work work);
+  // The same, but does not wait while the disk refuses: kUnavailable says why, and nothing was written.
+  absl::Status TryRun(Work work);
 
   size_t backlog() const { return backlog_.load(std::memory_order_relaxed); }
   // Commits and works since the start; commits << works shows the grouping.
@@ -39,19 +41,21 @@ class Writer {
   uint64_t works() const { return works_.load(std::memory_order_relaxed); }
   // Why nothing can be written now; OK if it can.
   absl::Status Trouble() const;
-  // kUnavailable while what was submitted is tried again and again: who asks for more need not wait on a thread.
-  absl::Status Stuck() const;
 
  private:
   struct Item {
     Work work;
     Done done;
     absl::Status result;
+    bool patient = true;  // waits while the disk refuses
   };
 
   void Loop();
   std::vector<Item> TakeBatch();
   void WriteBatch(std::vector<Item>& batch);
+  void Enqueue(Item item);
+  // Answers the impatient among `items`, leaves the others, and says how many went.
+  static size_t TurnAway(std::vector<Item>& items, const absl::Status& why);
   absl::Status TryBatch(std::vector<Item>& batch);
 
   std::unique_ptr<Tables> tables_;

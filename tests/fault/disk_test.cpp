@@ -33,7 +33,7 @@ class SmallDisk {
 // Symptom: every submit waited for the disk on one of eight io threads, and then nobody got an answer to anything.
 void ExpectAnswersWhileNothingCanBeWritten(Farm& farm, const SyntheticScene& scene, int64_t job) {
   std::vector<std::thread> stubborn;
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < 24; ++i) {
     stubborn.emplace_back([&farm, &scene, i] {
       FarmClient impatient(farm.Connect(), std::chrono::seconds(1));
       const auto refused = impatient.Submit(scene.Text(), {absl::StrCat("full", i), "", "", false});
