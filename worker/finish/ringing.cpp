@@ -70,18 +70,10 @@ class Quadratic {
   Eigen::Vector3d b_, eigenvalues_;
 };
 
-}  // namespace
-
-double WindowStrength(const RadianceSh& sh) {
-  const std::array<Quadratic, 3> channels = {Quadratic(sh, 0), Quadratic(sh, 1), Quadratic(sh, 2)};
-  // Above zero where no channel rings.
-  const auto room = [&](double strength) {
-    double least = 1;
-    for (const Quadratic& channel : channels) least = std::min(least, channel.Least(strength));
-    return least + kMostRinging;
-  };
+// A strength at which `room` is just above zero: it is below at 0 and above at infinity.
+template <typename Room>
+double Search(Room room) {
   double low = 0, f_low = room(0), high = 0.02, f_high = 0;
-  if (f_low >= 0) return 0;
   for (; (f_high = room(high)) < 0; high *= 4) {
     low = high;
     f_low = f_high;
@@ -96,6 +88,23 @@ double WindowStrength(const RadianceSh& sh) {
     (f < 0 ? f_low : f_high) = f;
   }
   return high;
+}
+
+}  // namespace
+
+double WindowStrength(const RadianceSh& sh) {
+  const std::array<Quadratic, 3> channels = {Quadratic(sh, 0), Quadratic(sh, 1), Quadratic(sh, 2)};
+  const std::array<double, 3> least = {channels[0].Least(0), channels[1].Least(0), channels[2].Least(0)};
+  const auto worst = static_cast<size_t>(std::min_element(least.begin(), least.end()) - least.begin());
+  if (least[worst] >= -kMostRinging) return 0;
+  // The window that the worst channel needs does for the others, nearly always.
+  const double strength = Search([&](double s) { return channels[worst].Least(s) + kMostRinging; });
+  const auto all = [&](double s) {
+    double room = 1;
+    for (const Quadratic& channel : channels) room = std::min(room, channel.Least(s) + kMostRinging);
+    return room;
+  };
+  return all(strength) >= 0 ? strength : Search(all);
 }
 
 RadianceSh Windowed(const RadianceSh& sh, double strength) {

@@ -65,6 +65,24 @@ class Scene:
             "bias": float(value.mean() / m - 1),
         }
 
+    def covered(self, folder):
+        """The share of charts, of those with 16 texels or more that are measured, whose error is below the bound that the bake states."""
+        pixels = load(os.path.join(folder, "lightmap-0.irradiance.exr"))
+        value, inside = pixels[..., :3] @ LUMINANCE, []
+        with open(os.path.join(folder, "lightmap-0.charts.json"), encoding="utf-8") as file:
+            charts = json.load(file)["charts"]
+        label = components(pixels[..., 3] > 0)
+        for chart in charts:
+            box = np.s_[chart["y0"]:chart["y1"], chart["x0"]:chart["x1"]]
+            # Rectangles overlap; a chart is the component that touches its rectangle's sides and has as many texels.
+            for part in np.unique(label[box]):
+                here = (label == part) & self.mask
+                if part < 0 or (label == part).sum() != chart["texels"] or here.sum() < 16 or chart["error_bound"] is None:
+                    continue
+                error = math.sqrt(max(((value - self.a) * (value - self.b))[here].mean(), 0)) / self.mean[here].mean()
+                inside.append(error <= chart["error_bound"])
+        return float(np.mean(inside)) if inside else None
+
     def z_test(self, folder):
         """z-scores of a path-traced reference against the other, over blocks of 8 x 8 texels. The other's standard error comes from two
         halves, one degree of freedom a texel (a quotient by it has a median square of 1, not 0.455), and single texels of a path
@@ -81,6 +99,20 @@ class Scene:
         """Sums of `value` over the measured texels of each block."""
         height, width = value.shape
         return np.where(self.mask, value, 0).reshape(height // side, side, width // side, side).sum((1, 3))
+
+
+def components(covered):
+    """Numbers of the eight-connected parts of a mask, -1 outside."""
+    label = np.where(covered, np.arange(covered.size).reshape(covered.shape), -1)
+    while True:
+        grown, padded = label, np.pad(label, 1, constant_values=-1)
+        for dy in range(3):
+            for dx in range(3):
+                grown = np.maximum(grown, padded[dy:dy + label.shape[0], dx:dx + label.shape[1]])
+        grown = np.where(covered, grown, -1)
+        if (grown == label).all():
+            return label
+        label = grown
 
 
 def run(command, level, folder, options):
@@ -110,6 +142,8 @@ def measure(scene, label, command, options, keep=None):
         row.update(scene.figures(os.path.join(folder, image)))
         if command == "reference":
             row["z"] = scene.z_test(folder)
+        else:
+            row["covered"] = scene.covered(folder)
     print(format_row(row), flush=True)
     return row
 
@@ -163,8 +197,9 @@ def examine_cornell():
 def format_row(r):
     rays = "" if r["rays"] is None else f"{r['rays'] / 1e6:.1f}"
     estimated = "" if r["estimated"] is None else f"{100 * r['estimated']:.2f}"
+    covered = "" if r.get("covered") is None else f"{100 * r['covered']:.0f}"
     return (f"| {r['scene']} | {r['who']} | {r['cpu_s']:.2f} | {rays} | {100 * r['relRMSE']:.2f} | "
-            f"{100 * r['p95']:.1f} | {100 * r['bias']:+.2f} | {estimated} |")
+            f"{100 * r['p95']:.1f} | {100 * r['bias']:+.2f} | {estimated} | {covered} |")
 
 
 def seconds_to(rows, target):
@@ -200,7 +235,7 @@ def bench_scene(name, quick):
 
 
 def table(results):
-    lines = ["| scene | who | CPU s | Mrays | relRMSE % | p95 % | bias % | own estimate % |", "|---|---|---|---|---|---|---|---|"]
+    lines = ["| scene | who | CPU s | Mrays | relRMSE % | p95 % | bias % | own estimate % | charts within bound % |", "|---|---|---|---|---|---|---|---|---|"]
     for groups in results.values():
         lines += [format_row(r) for rows in groups.values() for r in rows]
     lines += ["", "CPU seconds to an error (~: extrapolated along a slope of -1/2), and how many times more the others need than bakewell:", "",
