@@ -29,7 +29,22 @@ Found FindIn(std::span<const float> cdf, float value) {
   return {static_cast<int>(cell), std::min((static_cast<float>(cell) + within) / count, 0x1.fffffep-1f), width * count};
 }
 
+// Which sixteenth of a turn (x, y) points to, without an arc tangent: tan 22.5, 45 and 67.5 degrees divide a quadrant.
+int ColumnOf(float x, float y) {
+  static_assert(kColumns == 16);
+  const float across = std::fabs(x), up = std::fabs(y);
+  const int in_quadrant =
+      (up >= 0.41421356f * across ? 1 : 0) + (up >= across ? 1 : 0) + (up >= 2.41421356f * across ? 1 : 0);
+  if (y >= 0) return x >= 0 ? in_quadrant : 7 - in_quadrant;
+  return x >= 0 ? 15 - in_quadrant : 8 + in_quadrant;
+}
+
 }  // namespace
+
+size_t GatherGuide::CellOf(Vec3f local) {
+  const int row = std::min(static_cast<int>(GatherRow(local.z) * static_cast<float>(kRows)), kRows - 1);
+  return static_cast<size_t>(row * kColumns + ColumnOf(local.x, local.y));
+}
 
 GatherGuide::GatherGuide(const std::array<float, kCells>& weight) {
   float sum = 0;
@@ -79,10 +94,7 @@ std::optional<GatherGuide> FoundLight::GuideAt(Vec3f position, const Frame& fram
   for (const Ray& ray : kept_) {
     const Vec3f dir = frame.ToLocal(ray.at_infinity ? ray.place : NormalizeOrZero(ray.place - position));
     if (!(dir.z > 0)) continue;
-    const Vec2f u = GatherSquare(dir);
-    const int row = std::min(static_cast<int>(u.x * static_cast<float>(kRows)), kRows - 1);
-    const int column = std::min(static_cast<int>(u.y * static_cast<float>(kColumns)), kColumns - 1);
-    found[static_cast<size_t>(row * kColumns + column)] += 1;
+    found[GatherGuide::CellOf(dir)] += 1;
     in_sight += 1;
   }
   if (!(in_sight > 0)) return std::nullopt;

@@ -15,6 +15,8 @@ class GatherGuide {
   static constexpr int kRows = 8, kColumns = 16;  // cosine, azimuth
   static constexpr int kCells = kRows * kColumns;
 
+  // Where GatherHemisphere's direction lies, unit, about +z: row * kColumns + column.
+  static size_t CellOf(Vec3f local);
   // weight: kCells, row by row, all above zero.
   explicit GatherGuide(const std::array<float, kCells>& weight);
 

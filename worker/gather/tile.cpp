@@ -24,6 +24,7 @@ constexpr uint32_t kAuditSamples = 4;  // of suns and sky, a texel
 constexpr float kGatherCost = 2.5f;    // of a gather ray and what it meets, over a light sample
 constexpr float kBoundless = 1e30f;    // error of what tolerates none
 constexpr float kMargin = static_cast<float>(SetNoise::kMargin);  // what is reported is safe, what stops is likely
+constexpr uint32_t kGuidedFrom = 16;                              // samples; for fewer a guide costs more than it gains
 constexpr size_t kTellingSets = 32;                               // fewer sets of a tile say little about all
 constexpr int64_t kWorthLeavingOut = 64;                          // texels; fewer cost less than the audit
 
@@ -42,7 +43,8 @@ struct Work {
   bool has_direct = true, has_indirect = true;           // there is something to sample
   bool direct_active = false, indirect_active = false;   // in the next round
   Accumulator direct{}, indirect{};
-  std::optional<GatherGuide> guide{};          // of gather rays, after the first round
+  std::optional<GatherGuide> guide{};          // of gather rays, once there are kGuidedFrom
+  bool guided = false;                         // or there is nothing that a guide would gain
   std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
   int direct_samples = 0, indirect_samples = 0;
 
@@ -67,7 +69,7 @@ class TileGatherer {
     }
     CorrectVariances();
     Decide();
-    Guide();
+    KeepFound();
     while (Round()) {
       CorrectVariances();
       Decide();
@@ -194,19 +196,20 @@ class TileGatherer {
     counters_.skip[Skip::kUnseenSky].skipped += texels;
   }
 
-  // The first round's rays guide the others.
-  void Guide() {
+  // The first round's rays guide later ones: of them a tile keeps some.
+  void KeepFound() {
     // Texels that no light reaches have no say.
     float rays = 0;
     for (const Work& work : work_) rays += Luminance(work.indirect.Irradiance()) > 0 ? work.indirect.count() : 0;
-    found_->Resample(static_cast<double>(rays),
-                     UnitFloat(HashCombine(TexelKey(map_.texels[begin_], options_.seed), 0x9d1deu)));
-    for (Work& work : work_) {
-      if (!work.indirect_active) continue;
-      const TexelPoint point = work.sampler.At({0.5f, 0.5f});
-      work.guide = found_->GuideAt(point.surface.position, point.frame);
-    }
-    found_.reset();
+    found_.Resample(static_cast<double>(rays),
+                    UnitFloat(HashCombine(TexelKey(map_.texels[begin_], options_.seed), 0x9d1deu)));
+    collects_ = false;
+  }
+
+  void Guide(Work& work) {
+    const TexelPoint point = work.sampler.At({0.5f, 0.5f});
+    work.guide = found_.GuideAt(point.surface.position, point.frame);
+    work.guided = true;
   }
 
   // Doubles the samples of whatever is active. False when nothing was.
@@ -216,6 +219,7 @@ class TileGatherer {
       const auto direct = static_cast<uint32_t>(work.direct_samples),
                  indirect = static_cast<uint32_t>(work.indirect_samples);
       if (work.direct_active) DirectRound(work, direct, 2 * direct);
+      if (work.indirect_active && !work.guided && indirect >= kGuidedFrom) Guide(work);
       if (work.indirect_active) IndirectRound(work, indirect, 2 * indirect);
       any = any || work.direct_active || work.indirect_active;
     }
@@ -292,7 +296,7 @@ class TileGatherer {
       // Multiple importance sampling went by the unguided density, here as in GatherDirect.
       radiance = radiance / drawn.density;
       const Rgb irradiance = radiance * (local.z / pdf);
-      if (found_) found_->Add(hit ? scene_.world.PointAt(hit).position : dir, !hit, Luminance(irradiance));
+      if (collects_) found_.Add(hit ? scene_.world.PointAt(hit).position : dir, !hit, Luminance(irradiance));
       work.indirect.AddIrradiance(i, end, irradiance);
       work.indirect.AddSh(dir, radiance / pdf);
     }
@@ -415,7 +419,8 @@ class TileGatherer {
   const GatherOptions& options_;
   GatherCounters& counters_;
   std::optional<TileLights> lights_;
-  std::optional<FoundLight> found_{std::in_place};
+  FoundLight found_;
+  bool collects_ = true;
   const bool lit_ = !scene_.tree.empty() || scene_.lights.environment().bright() || scene_.lights.samples_distant();
   int64_t escaped_ = 0;  // gather rays
   Distant distant_ = Distant::kSampled;

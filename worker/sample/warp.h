@@ -47,12 +47,8 @@ inline Vec3f GatherHemisphere(Vec2f u) {
   return DirectionFromCosine(std::min(z, 1.0f), u.y);
 }
 
-// The inverse of GatherHemisphere.
-inline Vec2f GatherSquare(Vec3f dir) {
-  constexpr float a = kGatherCosineShare;
-  const float azimuth = std::atan2(dir.y, dir.x) * (0.5f / kPiF);
-  return {dir.z * (a * dir.z + 1 - a), azimuth < 0 ? azimuth + 1 : azimuth};
-}
+// The u.x with which GatherHemisphere gives a direction of cosine z; u.y is its azimuth over 2 pi.
+inline float GatherRow(float z) { return z * (kGatherCosineShare * z + 1 - kGatherCosineShare); }
 
 // Barycentrics (u of e1, v of e2), uniform over a triangle (Heitz 2019, low-distortion map).
 inline Vec2f TriangleFromSquare(Vec2f u) {

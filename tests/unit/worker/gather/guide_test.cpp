@@ -13,13 +13,14 @@ namespace {
 
 constexpr Frame kUp{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
-TEST(GatherSquare, IsTheInverseOfGatherHemisphere) {
+TEST(GatherGuide, CellsAreThoseOfThePrimarySquare) {
   TestRandom random(1);
   for (int i = 0; i < 10000; ++i) {
     const Vec2f u{random.Unit(), random.Unit()};
-    const Vec2f back = GatherSquare(GatherHemisphere(u));
-    EXPECT_NEAR(back.x, u.x, 1e-5);
-    EXPECT_NEAR(back.y, u.y, 1e-5);
+    const float row = u.x * GatherGuide::kRows, column = u.y * GatherGuide::kColumns;
+    if (std::fabs(row - std::round(row)) < 1e-3f || std::fabs(column - std::round(column)) < 1e-3f) continue;
+    EXPECT_EQ(GatherGuide::CellOf(GatherHemisphere(u)),
+              static_cast<size_t>(row) * GatherGuide::kColumns + static_cast<size_t>(column));
   }
 }
 
