@@ -44,7 +44,7 @@ struct Work {
   bool direct_active = false, indirect_active = false;   // in the next round
   Accumulator direct{}, indirect{};
   std::optional<GatherGuide> guide{};          // of gather rays, once there are kGuidedFrom
-  bool guided = false;                         // or there is nothing that a guide would gain
+  bool guided = false;                         // a guide was looked for
   std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
   int direct_samples = 0, indirect_samples = 0;
 
