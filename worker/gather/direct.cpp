@@ -181,18 +181,8 @@ void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const T
 
 Rgb FoundByGather(const GatherScene& scene, const TileLights* lights, const TileLights::Choice& choice,
                   const SurfacePoint& from, Vec3f dir, float pdf, const Hit& hit) {
-  if (!hit) {
-    const EnvironmentLight& sky = scene.lights.environment();
-    if (!sky.bright()) return {};
-    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : PowerHeuristic(pdf, sky.Pdf(dir)));
-  }
-  const int light = scene.lights.LightOfTriangle(hit.triangle);
-  if (light < 0) return {};
-  const Rgb emission = scene.world.EmissionAt(hit);
-  if (MaxComponent(emission) <= 0) return {};
-  const float chosen = lights ? lights->Probability(choice, from, light) : 0;
-  const float light_pdf = chosen > 0 ? chosen * scene.lights.PdfLocal(light, from.position, dir, hit.t) : 0;
-  return emission * PowerHeuristic(pdf, light_pdf);
+  return FoundByRay(scene, from, dir, pdf, hit,
+                    [&](int light) { return lights ? lights->Probability(choice, from, light) : 0; });
 }
 
 }  // namespace bakewell

@@ -16,23 +16,6 @@ constexpr float kNearWidths = 1.5f;
 
 float Random(uint32_t key, uint32_t what) { return UnitFloat(HashCombine(key, what)); }
 
-// Light that a bounce direction finds by itself: emission and sky, weighted against SampleDirect.
-Rgb FoundLight(const GatherScene& scene, const SurfacePoint& from, Vec3f dir, const Hit& hit) {
-  const float pdf = std::max(0.0f, Dot(dir, from.normal)) * kInvPiF;
-  if (!hit) {
-    const EnvironmentLight& sky = scene.lights.environment();
-    if (!sky.bright()) return {};
-    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : PowerHeuristic(pdf, sky.Pdf(dir)));
-  }
-  const int light = scene.lights.LightOfTriangle(hit.triangle);
-  if (light < 0) return {};
-  const Rgb emission = scene.world.EmissionAt(hit);
-  if (MaxComponent(emission) <= 0) return {};
-  const float light_pdf = scene.tree.Probability(LightTree::kRoot, light, {from.position, from.normal}) *
-                          scene.lights.PdfLocal(light, from.position, dir, hit.t);
-  return emission * PowerHeuristic(pdf, light_pdf);
-}
-
 Rgb Arriving(const GatherScene& scene, const SurfacePoint& point, const LightSample& sample, float probability,
              uint32_t key, GatherCounters& counters) {
   const float cosine = Dot(sample.dir, point.normal);
@@ -95,7 +78,10 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
     ++counters.bounce_rays;
     const Hit next = scene.world.Intersect(RayFrom(point, dir, kInfinity, step_key));
     throughput = throughput * kPiF;  // cosine lobe: irradiance is pi times the radiance found
-    result.radiance += throughput * FoundLight(scene, point, dir, next);
+    const float pdf = std::max(0.0f, Dot(dir, point.normal)) * kInvPiF;
+    result.radiance += throughput * FoundByRay(scene, point, dir, pdf, next, [&](int light) {
+                         return scene.tree.Probability(LightTree::kRoot, light, {point.position, point.normal});
+                       });
     if (!next) return result;
     hit = next;
   }

@@ -3,6 +3,7 @@
 #include "core/artifact/skip.h"
 #include "worker/light/tree.h"
 #include "worker/photon/cache.h"
+#include "worker/sample/mis.h"
 
 namespace bakewell {
 
@@ -36,5 +37,24 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& hit, uin
 // sky where it is not smooth. With multiple importance sampling (power heuristic) against a cosine lobe for lights
 // that a bounce can hit.
 Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters);
+
+// Radiance that a ray of density `pdf` finds by itself, emission and sky, weighted against samples of lights that are
+// drawn with chosen(light).
+template <typename Chosen>
+Rgb FoundByRay(const GatherScene& scene, const SurfacePoint& from, Vec3f dir, float pdf, const Hit& hit,
+               Chosen chosen) {
+  if (!hit) {
+    const EnvironmentLight& sky = scene.lights.environment();
+    if (!sky.bright()) return {};
+    return sky.Radiance(dir) * (sky.smooth() ? 1.0f : PowerHeuristic(pdf, sky.Pdf(dir)));
+  }
+  const int light = scene.lights.LightOfTriangle(hit.triangle);
+  if (light < 0) return {};
+  const Rgb emission = scene.world.EmissionAt(hit);
+  if (MaxComponent(emission) <= 0) return {};
+  const float probability = chosen(light);
+  const float light_pdf = probability > 0 ? probability * scene.lights.PdfLocal(light, from.position, dir, hit.t) : 0;
+  return emission * PowerHeuristic(pdf, light_pdf);
+}
 
 }  // namespace bakewell
