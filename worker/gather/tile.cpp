@@ -38,10 +38,10 @@ struct Work {
   bool valid = true;
   bool dark = false, audited = false;  // to be left out; but computed all the same
   uint8_t open = 0;
-  float direct_correction = 1, indirect_correction = 1;  // of the accumulators' variances
-  float backs = 0, backface_share = 0;                   // gather rays that met a back face; their share
-  bool has_direct = true, has_indirect = true;           // there is something to sample
-  bool direct_active = false, indirect_active = false;   // in the next round
+  float direct_correction = 1, indirect_correction = 1;           // of the accumulators' variances
+  float backs = 0, nearest_back = kInfinity, backface_share = 0;  // gather rays that met a back face [m], their share
+  bool has_direct = true, has_indirect = true;                    // there is something to sample
+  bool direct_active = false, indirect_active = false;            // in the next round
   Accumulator direct{}, indirect{};
   std::optional<GatherGuide> guide{};          // of gather rays, once there are kGuidedFrom
   bool guided = false;                         // a guide was looked for
@@ -63,10 +63,8 @@ class TileGatherer {
     Prepare(layout);
     if (!FirstRound()) return std::nullopt;
     if (options_.filter) Connect();
-    for (Work& work : work_) {
-      work.direct_active = work.has_direct;
-      work.indirect_active = work.has_indirect;
-    }
+    for (Work& work : work_) work.direct_active = work.has_direct;
+    for (Work& work : work_) work.indirect_active = work.has_indirect;
     CorrectVariances();
     Decide();
     KeepFound();
@@ -216,8 +214,8 @@ class TileGatherer {
   bool Round() {
     bool any = false;
     for (Work& work : work_) {
-      const auto direct = static_cast<uint32_t>(work.direct_samples),
-                 indirect = static_cast<uint32_t>(work.indirect_samples);
+      const auto indirect = static_cast<uint32_t>(work.indirect_samples);
+      const auto direct = static_cast<uint32_t>(work.direct_samples);
       if (work.direct_active) DirectRound(work, direct, 2 * direct);
       if (work.indirect_active && !work.guided && indirect >= kGuidedFrom) Guide(work);
       if (work.indirect_active) IndirectRound(work, indirect, 2 * indirect);
@@ -243,8 +241,8 @@ class TileGatherer {
   // The first round's rays say how much of the hemisphere meets back faces. A texel that turns out to lie partly or
   // wholly inside other geometry starts again from its valid parts, or not at all.
   void Validate(const Texel& texel, Work& work) {
-    const std::optional<float> backs =
-        work.indirect.count() > 0 ? std::optional(work.backs / work.indirect.count()) : std::nullopt;
+    std::optional<BacksSeen> backs;
+    if (work.indirect.count() > 0) backs = {work.backs / work.indirect.count(), work.nearest_back};
     const TexelValidity validity =
         ProbeValidity(scene_.world, work.key, backs, Skips(Skip::kInvalidTexels) ? PartSearch::kNear : PartSearch::kAll,
                       work.sampler);
@@ -280,7 +278,10 @@ class TileGatherer {
       const uint32_t ray_key = HashCombine(work.key, 0x80000000u | i);
       ++counters_.gather_rays;
       const Hit hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, ray_key));
-      work.backs += MeetsBack(scene_.world, hit) ? 1.0f : 0.0f;
+      if (MeetsBack(scene_.world, hit)) {
+        work.backs += 1;
+        work.nearest_back = std::min(work.nearest_back, hit.t);
+      }
       escaped_ += hit ? 0 : 1;
       Rgb radiance = FoundByGather(scene_, lights_ ? &*lights_ : nullptr, work.choice, point.surface, dir, pdf, hit);
       if (hit) {

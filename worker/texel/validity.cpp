@@ -9,6 +9,7 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kInsideShare = 0.9f;    // of back faces: the texel is inside as a whole, if nothing divides it
 constexpr float kOutsideShare = 0.25f;  // of back faces: the texel is outside as a whole, if nothing divides it
 constexpr int kCrowdRays = 8, kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
 
@@ -115,19 +116,20 @@ bool MeetsBack(const World& world, const Hit& hit) {
   return hit && hit.back && !world.MaterialOf(world.triangles()[hit.triangle]).double_sided;
 }
 
-TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<float> known_share, PartSearch search,
+TexelValidity ProbeValidity(const World& world, uint32_t key, const std::optional<BacksSeen>& seen, PartSearch search,
                             TexelSampler& sampler) {
   TexelValidity result;
   if (world.backfaces() == BackfaceMode::kPass) return result;
   const SobolSet set(HashCombine(key, 0x7a11du));
   const TexelPoint center = sampler.At({0.5f, 0.5f});
   result.backface_share =
-      known_share ? *known_share : BackShare(world, center.surface, center.frame, set, kValidityFirstRays, result.rays);
+      seen ? seen->share : BackShare(world, center.surface, center.frame, set, kValidityFirstRays, result.rays);
   if (search == PartSearch::kNear) {
     if (result.backface_share == 0) return Saving(kCrowdRays, result);
-    if (!Crowded(world, center, sampler.radius(), result.rays)) {
-      if (result.backface_share <= kOutsideShare) return Saving(kPlaces * kPlaceRays, result);
-      return ProbeWhole(world, sampler, set, result);
+    const bool outside = seen && result.backface_share <= kOutsideShare && seen->nearest > 2 * sampler.radius();
+    const bool inside = result.backface_share > kInsideShare;
+    if ((outside || inside) && !Crowded(world, center, sampler.radius(), result.rays)) {
+      return outside ? Saving(kPlaces * kPlaceRays, result) : ProbeWhole(world, sampler, set, result);
     }
   } else if (result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) {
     return result;

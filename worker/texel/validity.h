@@ -18,15 +18,22 @@ struct TexelValidity {
   int rays_saved = 0;  // by PartSearch::kNear
 };
 
+// What rays of the caller's over a texel met.
+struct BacksSeen {
+  float share = 0;    // of back faces
+  float nearest = 0;  // distance of the nearest of them [m]
+};
+
 // Finds the parts of a texel that lie inside other geometry (more than half of their hemisphere meets the back of a
 // single-sided surface first) and rules them out in the sampler's mask; a texel that is wholly inside is moved past a
 // back face within its own diagonal, if that helps. Texels whose first rays meet no back face, and that have nothing
-// standing within their own reach, cost no more than those rays. `known_share`: share of back faces that rays of the
-// caller's met already; without it eight rays find out. With BackfaceMode::kPass nothing has a back.
-// Search::kNear trusts those rays where they start all over the texel: it looks for parts only where some met a back
-// face and something stands within the texel's reach; elsewhere what holds for the centre holds for all of it.
+// standing within their own reach, cost no more than those rays. `seen`: without it eight rays find out. With
+// BackfaceMode::kPass nothing has a back. Search::kNear trusts those rays where they start all over the texel: it looks
+// for parts only where some met a back face, and not where nothing stands within the texel's reach and either nearly
+// all of them did, and what holds for the centre holds for all of it, or few did and none near by, as a plate that
+// hangs over part of the texel would be.
 enum class PartSearch : uint8_t { kAll, kNear };
-TexelValidity ProbeValidity(const World& world, uint32_t key, std::optional<float> known_share, PartSearch search,
+TexelValidity ProbeValidity(const World& world, uint32_t key, const std::optional<BacksSeen>& seen, PartSearch search,
                             TexelSampler& sampler);
 
 // Whether a ray's first hit is the back of a single-sided surface.

@@ -75,8 +75,9 @@ TEST(ProbeValidity, NearSearchFindsTheSameWithFewerRays) {
     const PreparedLevel prepared = PrepareInMemory(FloorWithBox(x0, 6, 1, 6), settings);
     const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(24 + x)]];
     TexelSampler all(*prepared.world, prepared.layout, prepared.texels, texel), near = all;
-    const TexelValidity a = ProbeValidity(*prepared.world, 1, share, PartSearch::kAll, all);
-    const TexelValidity b = ProbeValidity(*prepared.world, 1, share, PartSearch::kNear, near);
+    const BacksSeen seen{share, 0.5f};
+    const TexelValidity a = ProbeValidity(*prepared.world, 1, seen, PartSearch::kAll, all);
+    const TexelValidity b = ProbeValidity(*prepared.world, 1, seen, PartSearch::kNear, near);
     EXPECT_EQ(a.valid, b.valid) << x;
     EXPECT_EQ(a.pushed_out, b.pushed_out) << x;
     EXPECT_EQ(all.valid_mask(), near.valid_mask()) << x;
@@ -93,10 +94,30 @@ TEST(ProbeValidity, BackFacesInTheDistanceDivideNoTexel) {
   const PreparedLevel prepared = PrepareInMemory(scene, {});
   const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 4 + 4)]];
   TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-  const TexelValidity validity = ProbeValidity(*prepared.world, 1, 0.2f, PartSearch::kNear, sampler);
+  const TexelValidity validity = ProbeValidity(*prepared.world, 1, BacksSeen{0.2f, 4}, PartSearch::kNear, sampler);
   EXPECT_TRUE(validity.valid);
   EXPECT_EQ(sampler.valid_mask(), 0xffff);
   EXPECT_EQ(validity.rays, 8);
+}
+
+// Symptom: rays along the ceiling missed a lamp's plate 1 cm below it, and all of the texel was taken to be as its
+// covered centre was.
+TEST(ProbeValidity, APlateThatHangsOverPartOfATexelDividesIt) {
+  SceneBuilder builder({8, 8});
+  builder.AddQuad({0, 0, 0}, {8, 0, 0}, {0, 0, -8}, {.page = {0, 0, 8, 8}});
+  builder.AddQuad({1.4, 0.01, -3}, {3, 0, 0}, {0, 0, -3}, {.lightmapped = false});  // turns its back to the floor
+  const Scene scene = builder.Build();
+  BakeSettings settings;
+  settings.footprint = 1;
+  const PreparedLevel prepared = PrepareInMemory(scene, settings);
+  const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 4 + 1)]];
+  for (const float share : {0.2f, 0.6f, 0.85f}) {
+    TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
+    const TexelValidity validity =
+        ProbeValidity(*prepared.world, 1, BacksSeen{share, 0.02f}, PartSearch::kNear, sampler);
+    EXPECT_TRUE(validity.valid) << share;
+    EXPECT_EQ(sampler.valid_mask(), 0x3333) << share;
+  }
 }
 
 TEST(ProbeValidity, NothingHasABackWhereBackfacesPass) {
