@@ -15,7 +15,8 @@ struct ChartSummary {
   double standard_error = 0;    // root mean square over valid texels, luminance [W m^-2]
 };
 
-// schema/charts.md: for each chart its error, relative to its own mean, and a bound that nine charts of ten stay below.
+// schema/charts.md: for each chart its error, relative to its own mean, and a bound that nine charts of ten stay below
+// at preview and medium quality.
 std::string ChartsJson(int page, std::span<const ChartSummary> charts);
 
 // Standard errors in that bound: what filtering blurs and the cache spreads is in no variance.

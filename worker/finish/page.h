@@ -11,8 +11,8 @@ namespace bakewell {
 // The images of one page (schema/lightmap.md). Row 0 is v = 0.
 struct PageImages {
   Image irradiance;  // R G B [W m^-2] at the geometric normal, A coverage
-  Image sh;          // sh0.R sh0.G sh0.B ... sh8.B: lambda_i of the incident radiance, windowed where they ring
-  Image variance;    // R G B variance of the irradiance, A share of back faces in the hemisphere
+  Image sh;  // sh0.R sh0.G sh0.B ... sh8.B: lambda_i of the incident radiance, world frame, windowed where they ring
+  Image variance;  // R G B variance of the irradiance, A share of back faces in the hemisphere
 };
 
 inline constexpr int kGutterTexels = 8;
