@@ -14,7 +14,8 @@ std::vector<bool> Allot(std::span<const Claim> claims, size_t texels) {
   double sum = 0;
   std::vector<size_t> order;
   for (size_t i = 0; i < claims.size(); ++i) {
-    sum += static_cast<double>(claims[i].error);
+    // Beyond what one texel may have, what can get no more samples is nobody else's to make up for.
+    sum += static_cast<double>(claims[i].open ? claims[i].error : std::min(claims[i].error, 1.0f));
     if (!claims[i].open || !(claims[i].error > 0)) continue;
     if (claims[i].error > kWorst * kWorst) {
       granted[i] = true;

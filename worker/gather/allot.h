@@ -15,9 +15,10 @@ struct Claim {
 };
 
 // Which claims are granted: one flag a claim. The claims' errors are to add up to at most `texels`, the number of
-// texels that they are of, and none may stay above kWorst squared. Doubling halves an error, so those that gain most
-// for their cost come first: the sum of costs is least where all gain alike (Neyman's allocation, with the marginal
-// rule of Lagrange). Where a lit plain has less noise than it may, the penumbra in its middle may have more.
+// texels that they are of, and none may stay above kWorst squared; what can get no more samples counts as one texel's
+// at most. Doubling halves an error, so those that gain most for their cost come first: the sum of costs is least where
+// all gain alike (Neyman's allocation, with the marginal rule of Lagrange). Where a lit plain has less noise than it
+// may, the penumbra in its middle may have more.
 inline constexpr float kWorst = 2;  // standard errors over what is tolerated
 std::vector<bool> Allot(std::span<const Claim> claims, size_t texels);
 
