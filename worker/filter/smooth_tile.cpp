@@ -22,7 +22,8 @@ SmoothCell& SmoothTile::CellOf(size_t i) {
   return grid_.At(texel.x - left_, texel.y - top_);
 }
 
-std::vector<uint8_t> SmoothTile::Connect(const World& world, const std::vector<bool>& valid, int64_t& rays) {
+std::vector<uint8_t> SmoothTile::Connect(const World& world, const std::vector<bool>& valid,
+                                         const std::vector<bool>& crowded, int64_t& rays) {
   std::vector<uint8_t> open(end_ - begin_, 0);
   for (int y = 0; y < grid_.height(); ++y) {
     for (int x = 0; x < grid_.width(); ++x) {
@@ -32,7 +33,7 @@ std::vector<uint8_t> SmoothTile::Connect(const World& world, const std::vector<b
       if (!IsMine(texel)) {
         ConnectCell(x, y, texel, valid, 0xf);
       } else if (valid[texel - begin_]) {
-        open[texel - begin_] = ConnectTexel(world, map_, texel, rays);
+        open[texel - begin_] = ConnectTexel(world, map_, texel, crowded[texel - begin_], rays);
         ConnectCell(x, y, texel, valid, open[texel - begin_]);
       }
     }

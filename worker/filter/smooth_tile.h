@@ -14,8 +14,10 @@ class SmoothTile {
   // Texels [begin, end) of the map are the tile.
   SmoothTile(const TexelMap& map, uint32_t begin, uint32_t end);
 
-  // Connects neighbours. valid: one flag a texel of the tile. Returns ConnectTexel's bits, one element a texel.
-  std::vector<uint8_t> Connect(const World& world, const std::vector<bool>& valid, int64_t& rays);
+  // Connects neighbours. valid, crowded (IsCrowded): one flag a texel of the tile. Returns ConnectTexel's bits, one
+  // element a texel.
+  std::vector<uint8_t> Connect(const World& world, const std::vector<bool>& valid, const std::vector<bool>& crowded,
+                               int64_t& rays);
 
   // The value of texel `i` of the tile and its variance, before filtering. Only of valid texels.
   void Put(size_t i, float value, float variance);

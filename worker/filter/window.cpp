@@ -111,7 +111,7 @@ constexpr Rings kRings;
 
 }  // namespace
 
-uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, int64_t& rays) {
+uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, bool crowded, int64_t& rays) {
   const Texel& a = map.texels[texel];
   const PageSize page = map.pages[a.page];
   uint8_t open = 0;
@@ -126,7 +126,7 @@ uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, in
     const float lift = kLift * Length(b.position - a.position);
     const Vec3f from = a.position + a.normal * lift, way = b.position + b.normal * lift - from;
     const float length = Length(way);
-    if (length > 0) {
+    if (crowded && length > 0) {
       ++rays;
       if (world.Occluded({from, way / length, length, 0})) continue;
     }
@@ -235,7 +235,7 @@ class SmoothGrid::Growth {
 
   Smoothed Result(const Weights& weights, double estimate) const {
     const double square = known_.n == all_.n ? weights.Square(known_) : Weights(all_).Square(all_);
-    return {static_cast<float>(estimate), static_cast<float>(square * mean_variance())};
+    return {static_cast<float>(estimate), static_cast<float>(square * mean_variance()), static_cast<float>(square)};
   }
 
   // Adds the next ring's texels that are connected to the window. False where there are none.
@@ -422,7 +422,8 @@ SmoothGrid::Smoothed SmoothGrid::SmoothedAt(int x, int y, float radius, Steps& s
   }
   const float part = radius - static_cast<float>(whole);
   return {steps[whole].value * (1 - part) + steps[next].value * part,
-          steps[whole].variance * (1 - part) + steps[next].variance * part};
+          steps[whole].variance * (1 - part) + steps[next].variance * part,
+          steps[whole].square * (1 - part) + steps[next].square * part};
 }
 
 }  // namespace bakewell

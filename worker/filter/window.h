@@ -13,8 +13,9 @@ inline constexpr std::array<std::array<int, 2>, 8> kNeighbours = {
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 
 // Which of its first four neighbours a texel is connected to, bit k for direction k: those of its chart that face about
-// the same way and that a short ray just above the surface reaches.
-uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, int64_t& rays);
+// the same way and that a short ray just above the surface reaches, which is not asked of texels that are not `crowded`
+// (IsCrowded).
+uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, bool crowded, int64_t& rays);
 
 // One texel of a noisy signal.
 struct SmoothCell {
@@ -61,6 +62,7 @@ class SmoothGrid {
   // as the others.
   struct Smoothed {
     float value = 0, variance = -1;  // negative: not computed
+    float square = 1;                // sum of the squared weights
   };
   using Steps = std::array<Smoothed, kMostRadius + 1>;
   // The radius of the largest window whose estimate agrees with those of all smaller ones, between two whole ones where

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -23,7 +24,9 @@ class Accumulator {
   // Sample `index` of `planned` in all (a multiple of kBlocks) found this irradiance. Samples come in order; the run
   // ends with its block.
   void AddIrradiance(uint32_t index, uint32_t planned, Rgb irradiance) {
-    const size_t block = static_cast<size_t>(index) * kBlocks / planned;
+    planned_ = planned;
+    const size_t block =
+        planned <= static_cast<uint32_t>(kBlocks) ? index : static_cast<size_t>(index) * kBlocks / planned;
     if (++run_ > kRun || block != run_block_) EndRun(block);
     run_irradiance_ += irradiance;
   }
@@ -35,10 +38,12 @@ class Accumulator {
   // Before a round that doubles the samples.
   void Double() {
     EndRun(0);
+    if (planned_ < static_cast<uint32_t>(kBlocks)) return;
     for (size_t b = 0; b < kBlocks / 2; ++b) block_[b] = block_[2 * b] + block_[2 * b + 1];
     for (size_t b = kBlocks / 2; b < kBlocks; ++b) block_[b] = {};
   }
 
+  size_t blocks() const { return std::min<size_t>(kBlocks, planned_); }
   float count() const { return static_cast<float>(count_); }
   Rgb Irradiance() const { return ToFloat(Mean()); }
   RadianceSh Sh() const {
@@ -50,10 +55,13 @@ class Accumulator {
   // Variance of Irradiance(), per channel, if its blocks were independent.
   Rgb Variance() const {
     if (count_ <= 0) return {};
-    const Vec3d mean = Mean() * (count_ / kBlocks);
+    const size_t blocks = this->blocks();
+    if (blocks < 2) return ToFloat(Mean() * Mean());
+    const auto n = static_cast<double>(blocks);
+    const Vec3d mean = Mean() * (count_ / n);
     Vec3d sum;
-    for (size_t b = 0; b < kBlocks; ++b) sum += (Block(b) - mean) * (Block(b) - mean);
-    return ToFloat(sum * (kBlocks / (count_ * count_ * (kBlocks - 1))));
+    for (size_t b = 0; b < blocks; ++b) sum += (Block(b) - mean) * (Block(b) - mean);
+    return ToFloat(sum * (n / (count_ * count_ * (n - 1))));
   }
   // Mean squares of half the difference between the two halves (luminance): of the whole, of a half, of a quarter. Each
   // is what doubling the samples to that size took off the variance (1 : 2 : 4 for independent samples).
@@ -92,6 +100,7 @@ class Accumulator {
   }
 
   double count_ = 0;
+  uint32_t planned_ = 0;
   std::array<Vec3d, kBlocks> block_{};
   std::array<Vec3d, kShCoefficients> sh_{};
   uint32_t run_ = 0;  // samples in the run

@@ -1,57 +1,71 @@
 #include "worker/gather/allot.h"
 
 #include <algorithm>
+#include <map>
 
 namespace bakewell {
 namespace {
 
 constexpr double kAim = 0.95;  // of the sum that is allowed: rounds for the last crumbs cost more than they bring
 
+constexpr float kChartsShare = 0.1f;  // of what a texel's variance is taken to be, the rest its neighbourhood's
+
 }  // namespace
 
 std::vector<bool> Allot(std::span<const Claim> claims, size_t texels) {
+  struct Next {
+    double error, cost;
+    int doublings;
+    size_t claim;
+    bool Urgent() const { return error > static_cast<double>(kWorst * kWorst); }
+    // The last of a heap is granted first.
+    bool operator<(const Next& other) const {
+      if (Urgent() != other.Urgent()) return other.Urgent();
+      const double gain = error * other.cost, other_gain = other.error * cost;
+      return gain != other_gain ? gain < other_gain : claim > other.claim;
+    }
+  };
   std::vector<bool> granted(claims.size(), false);
   double sum = 0;
-  std::vector<size_t> order;
+  std::vector<Next> heap;
   for (size_t i = 0; i < claims.size(); ++i) {
+    const auto error = static_cast<double>(claims[i].error);
     // Beyond what one texel may have, what can get no more samples is nobody else's to make up for.
-    sum += static_cast<double>(claims[i].open ? claims[i].error : std::min(claims[i].error, 1.0f));
-    if (!claims[i].open || !(claims[i].error > 0)) continue;
-    if (claims[i].error > kWorst * kWorst) {
-      granted[i] = true;
-    } else {
-      order.push_back(i);
-    }
+    sum += claims[i].doublings > 0 ? error : std::min(error, 1.0);
+    if (claims[i].doublings > 0 && error > 0) heap.push_back({error, claims[i].cost, claims[i].doublings, i});
   }
+  std::make_heap(heap.begin(), heap.end());
+  // All doublings that the whole will take, as far as can be told: who has none of them waits.
   const double allowed = static_cast<double>(texels);
-  if (sum <= allowed) return granted;
-  for (size_t i = 0; i < claims.size(); ++i) sum -= granted[i] ? 0.5 * static_cast<double>(claims[i].error) : 0;
-  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    const float gain_a = claims[a].error * claims[b].cost, gain_b = claims[b].error * claims[a].cost;
-    return gain_a != gain_b ? gain_a > gain_b : a < b;
-  });
-  for (const size_t i : order) {
-    if (sum <= kAim * allowed) break;
-    granted[i] = true;
-    sum -= 0.5 * static_cast<double>(claims[i].error);
+  const bool enough = sum <= allowed;
+  while (!heap.empty() && (heap.front().Urgent() || (!enough && sum > kAim * allowed))) {
+    std::pop_heap(heap.begin(), heap.end());
+    Next next = heap.back();
+    heap.pop_back();
+    granted[next.claim] = true;
+    next.error *= 0.5;
+    next.cost *= 2;
+    sum -= --next.doublings > 0 ? next.error : std::max(next.error, 2 * next.error - 1);
+    if (next.doublings == 0) continue;
+    heap.push_back(next);
+    std::push_heap(heap.begin(), heap.end());
   }
   return granted;
 }
 
-std::vector<float> MeanOverNeighbours(const TexelMap& map, uint32_t begin, const std::vector<float>& values,
-                                      const std::vector<bool>& valid) {
+std::vector<float> TilePool::Mean(std::span<const float> values) const {
   std::vector<float> means(values.size(), 0);
   for (size_t i = 0; i < values.size(); ++i) {
-    const Texel& texel = map.texels[begin + i];
-    const PageSize page = map.pages[texel.page];
+    const Texel& texel = map_.texels[begin_ + i];
+    const PageSize page = map_.pages[texel.page];
     float sum = 0;
     int count = 0;
     for (int y = std::max(0, texel.y - 1); y <= std::min(page.height - 1, texel.y + 1); ++y) {
       for (int x = std::max(0, texel.x - 1); x <= std::min(page.width - 1, texel.x + 1); ++x) {
         const size_t at = static_cast<size_t>(y) * static_cast<size_t>(page.width) + static_cast<size_t>(x);
-        const int64_t j = int64_t{map.texel_at[texel.page][at]} - begin;
-        if (j < 0 || j >= std::ssize(values) || !valid[static_cast<size_t>(j)]) continue;
-        if (map.texels[begin + static_cast<size_t>(j)].chart != texel.chart) continue;
+        const int64_t j = int64_t{map_.texel_at[texel.page][at]} - begin_;
+        if (j < 0 || j >= std::ssize(values) || !valid_[static_cast<size_t>(j)]) continue;
+        if (map_.texels[begin_ + static_cast<size_t>(j)].chart != texel.chart) continue;
         sum += values[static_cast<size_t>(j)];
         ++count;
       }
@@ -59,6 +73,29 @@ std::vector<float> MeanOverNeighbours(const TexelMap& map, uint32_t begin, const
     if (count > 0) means[i] = sum / static_cast<float>(count);
   }
   return means;
+}
+
+std::vector<float> TilePool::Variance(std::vector<float> variance, std::span<const int> samples) const {
+  struct Sum {
+    float variance = 0, texels = 0;
+  };
+  std::map<int32_t, Sum> charts;
+  const auto count = [&](size_t i) { return static_cast<float>(std::max(1, samples[i])); };
+  for (size_t i = 0; i < variance.size(); ++i) {
+    variance[i] *= count(i);
+    if (!valid_[i]) continue;
+    Sum& chart = charts[map_.texels[begin_ + i].chart];
+    chart.variance += variance[i];
+    chart.texels += 1;
+  }
+  variance = Mean(variance);
+  for (size_t i = 0; i < variance.size(); ++i) {
+    // Where all around there is nothing, there is nothing rare.
+    if (!(variance[i] > 0)) continue;
+    const Sum& chart = charts[map_.texels[begin_ + i].chart];
+    variance[i] = ((1 - kChartsShare) * variance[i] + kChartsShare * chart.variance / chart.texels) / count(i);
+  }
+  return variance;
 }
 
 }  // namespace bakewell

@@ -11,20 +11,34 @@ namespace bakewell {
 struct Claim {
   float error = 0;    // its variance over the square of what the texel tolerates
   float cost = 0;     // of doubling its samples, in any unit
-  bool open = false;  // more samples are possible
+  int doublings = 0;  // of its samples that are possible
 };
 
 // Which claims are granted: one flag a claim. The claims' errors are to add up to at most `texels`, the number of
 // texels that they are of, and none may stay above kWorst squared; what can get no more samples counts as one texel's
 // at most. Doubling halves an error, so those that gain most for their cost come first: the sum of costs is least where
 // all gain alike (Neyman's allocation, with the marginal rule of Lagrange). Where a lit plain has less noise than it
-// may, the penumbra in its middle may have more.
+// may, the penumbra in its middle may have more. Granted is who will need to double at all until the sum is met, a few
+// rounds ahead: what a penumbra still owes after this round is no reason for the plain to double in it.
 inline constexpr float kWorst = 2;  // standard errors over what is tolerated
 std::vector<bool> Allot(std::span<const Claim> claims, size_t texels);
 
-// Of one value a texel, from texel `begin` on: its mean over each texel and those of its eight neighbours that are
-// among them, valid and of the same chart.
-std::vector<float> MeanOverNeighbours(const TexelMap& map, uint32_t begin, const std::vector<float>& values,
-                                      const std::vector<bool>& valid);
+// What texels of a tile say together. Vectors have one element a texel, from texel `begin` on.
+class TilePool {
+ public:
+  TilePool(const TexelMap& map, uint32_t begin, std::vector<bool> valid)
+      : map_(map), begin_(begin), valid_(std::move(valid)) {}
+  // Over each texel and those of its eight neighbours that are of the tile, valid and of the same chart.
+  std::vector<float> Mean(std::span<const float> values) const;
+  // The variance that each texel's number of samples leaves, where neighbours tell what one sample's is, and the
+  // chart's part of the tile what is so rare that a neighbourhood has not met it: a texel that judged by what it found
+  // would stop where it found little.
+  std::vector<float> Variance(std::vector<float> variance, std::span<const int> samples) const;
+
+ private:
+  const TexelMap& map_;
+  const uint32_t begin_;
+  const std::vector<bool> valid_;
+};
 
 }  // namespace bakewell

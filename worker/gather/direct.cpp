@@ -113,20 +113,22 @@ class DirectAdder {
   DirectAdder(const GatherScene& scene, Accumulator& sum, GatherCounters& counters)
       : scene_(scene), sum_(sum), counters_(counters) {}
 
-  void Add(const TexelPoint& point, const LightSample& sample, float probability, uint32_t key) {
+  // False where nothing arrives.
+  bool Add(const TexelPoint& point, const LightSample& sample, float probability, uint32_t key) {
     const float cosine = Dot(sample.dir, point.surface.normal);
-    if (cosine <= 0 || MaxComponent(sample.perpendicular) <= 0) return;
+    if (cosine <= 0 || MaxComponent(sample.perpendicular) <= 0) return false;
     ++counters_.shadow_rays;
-    if (scene_.world.Occluded(ShadowRay(point.surface, sample, key))) return;
+    if (scene_.world.Occluded(ShadowRay(point.surface, sample, key))) return false;
     const float light_pdf = sample.pdf * probability;
     const float weight = sample.pdf > 0 ? PowerHeuristic(light_pdf, GatherPdf(cosine)) : 1.0f;
     const Rgb radiance_over_pdf = sample.perpendicular * (weight / probability);
     if (!IsFinite(radiance_over_pdf)) {
       ++counters_.bad_samples;
-      return;
+      return true;
     }
     irradiance_ += radiance_over_pdf * cosine;
     sum_.AddSh(sample.dir, radiance_over_pdf);
+    return true;
   }
 
   void Finish(uint32_t index, uint32_t planned) {
@@ -170,11 +172,13 @@ void GatherDirect(const GatherScene& scene, const TexelSampler& sampler, const T
       const Vec2f shift{UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k))),
                         UnitFloat(HashCombine(key, static_cast<uint32_t>(2 * k + 1)))};
       const Vec2f v = far.Get2(0) + (k == 0 ? Vec2f{} : shift);
-      adder.Add(under_sun,
-                scene.lights.SampleDirectional(static_cast<int>(k), {v.x - std::floor(v.x), v.y - std::floor(v.y)}), 1,
-                ray_key);
+      const LightSample sample =
+          scene.lights.SampleDirectional(static_cast<int>(k), {v.x - std::floor(v.x), v.y - std::floor(v.y)});
+      counters.distant_found += adder.Add(under_sun, sample, 1, ray_key) ? 1 : 0;
     }
-    if (sky_sampled) adder.Add(point, scene.lights.SampleEnvironment(far.Get2(2)), 1, ray_key);
+    if (sky_sampled) {
+      counters.distant_found += adder.Add(point, scene.lights.SampleEnvironment(far.Get2(2)), 1, ray_key) ? 1 : 0;
+    }
     adder.Finish(i, end);
   }
 }

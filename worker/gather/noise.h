@@ -16,9 +16,10 @@ class SetNoise {
   // In Correction: a tile's texels tell how the doublings fall only so well, and errors are to err on the safe side.
   static constexpr double kMargin = 1.2;
 
-  // A set whose errors are measured in `unit` [W m^-2]; above zero, else it does not count.
+  // A set whose errors are measured in `unit` [W m^-2]. Sets that are too small to tell, or found no light, do not
+  // count.
   void Add(const Accumulator& set, float unit) {
-    if (!(unit > 0)) return;
+    if (!(unit > 0) || set.blocks() < kBlocks || !(Luminance(set.Irradiance()) > 0)) return;
     const double weight = 1 / (static_cast<double>(unit) * static_cast<double>(unit));
     const std::array<double, 3> halvings = set.Halvings();
     for (size_t k = 0; k < halving_.size(); ++k) halving_[k] += halvings[k] * weight;

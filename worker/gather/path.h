@@ -18,6 +18,7 @@ struct GatherScene {
 
 struct GatherCounters {
   int64_t gather_rays = 0, shadow_rays = 0, bounce_rays = 0, validity_rays = 0, filter_rays = 0, bad_samples = 0;
+  int64_t distant_found = 0;  // samples of suns and sky that arrived; reported to nobody
   SkipTally skip;
   int64_t light_rays() const { return gather_rays + shadow_rays + bounce_rays; }
 };

@@ -1,16 +1,16 @@
 #include "worker/gather/tile.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
 
 #include "worker/filter/smooth_tile.h"
 #include "worker/gather/allot.h"
-#include "worker/gather/direct.h"
-#include "worker/gather/guide.h"
 #include "worker/gather/noise.h"
 #include "worker/gather/skip.h"
+#include "worker/gather/work.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
 #include "worker/texel/validity.h"
@@ -19,38 +19,15 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kCulledShare = 0.1f;   // of the target error of the tile's dimmest texel
-constexpr uint32_t kAuditSamples = 4;  // of suns and sky, a texel
-constexpr float kGatherCost = 2.5f;    // of a gather ray and what it meets, over a light sample
-constexpr float kBoundless = 1e30f;    // error of what tolerates none
+constexpr float kCulledShare = 0.1f;  // of the target error of the tile's dimmest texel
+constexpr float kGatherCost = 2.5f;   // of a gather ray and what it meets, over a light sample
+constexpr float kBoundless = 1e30f;   // error of what tolerates none
 constexpr float kMargin = static_cast<float>(SetNoise::kMargin);  // what is reported is safe, what stops is likely
 constexpr uint32_t kGuidedFrom = 16;                              // samples; for fewer a guide costs more than it gains
 constexpr size_t kTellingSets = 32;                               // fewer sets of a tile say little about all
 constexpr int64_t kWorthLeavingOut = 64;                          // texels; fewer cost less than the audit
 
-// Everything about one texel while its tile is in flight.
-struct Work {
-  explicit Work(TexelSampler its_sampler) : sampler(std::move(its_sampler)) {}
-
-  TexelSampler sampler;
-  TileLights::Choice choice{};
-  uint32_t key = 0;
-  bool valid = true;
-  bool dark = false, audited = false;  // to be left out; but computed all the same
-  uint8_t open = 0;
-  float direct_correction = 1, indirect_correction = 1;           // of the accumulators' variances
-  float backs = 0, nearest_back = kInfinity, backface_share = 0;  // gather rays that met a back face [m], their share
-  bool has_direct = true, has_indirect = true;                    // there is something to sample
-  bool direct_active = false, indirect_active = false;            // in the next round
-  Accumulator direct{}, indirect{};
-  std::optional<GatherGuide> guide{};          // of gather rays, once there are kGuidedFrom
-  bool guided = false;                         // a guide was looked for
-  std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
-  int direct_samples = 0, indirect_samples = 0;
-
-  Rgb DirectVariance() const { return direct.Variance() * direct_correction; }
-  Rgb IndirectVariance() const { return indirect.Variance() * indirect_correction; }
-};
+using Work = TexelWork;
 
 class TileGatherer {
  public:
@@ -73,7 +50,7 @@ class TileGatherer {
       Decide();
     }
     std::vector<TexelLight> result;
-    for (const Work& work : work_) result.push_back(Finish(work));
+    for (const Work& work : work_) result.push_back(work.Finish());
     return result;
   }
 
@@ -84,6 +61,7 @@ class TileGatherer {
       const Texel& texel = map_.texels[i];
       Work work(TexelSampler(scene_.world, layout, map_, texel));
       work.key = TexelKey(texel, options_.seed);
+      work.crowded = IsCrowded(scene_.world, layout, texel, work.sampler.radius());
       work_.push_back(std::move(work));
     }
     if (lit_ ? Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) LeaveOutDark();
@@ -120,10 +98,21 @@ class TileGatherer {
     }
   }
 
+  // What other geometry may divide is looked at closely from the start.
+  uint32_t FirstSamples(const Work& work) const {
+    return static_cast<uint32_t>(work.crowded ? std::max(options_.min_samples, kBlocks) : options_.min_samples);
+  }
+
   std::vector<bool> Valid() const {
     std::vector<bool> valid;
     for (const Work& work : work_) valid.push_back(work.valid);
     return valid;
+  }
+
+  std::vector<bool> Crowded() const {
+    std::vector<bool> crowded;
+    for (const Work& work : work_) crowded.push_back(work.crowded);
+    return crowded;
   }
 
   std::vector<uint32_t> Keys() const {
@@ -140,27 +129,27 @@ class TileGatherer {
   }
   float Tolerated(float irradiance) const { return options_.target_error * Weighing(irradiance); }
 
-  // Rays over the hemisphere, which also say which texels are valid and whether the tile sees the sky; then lights.
+  // Rays over the hemisphere, which also say which texels are valid; then lights.
   // False where texels that were to be left out have light.
   bool FirstRound() {
-    const uint32_t samples = static_cast<uint32_t>(options_.min_samples);
     SkipAudit audit;
     std::vector<int64_t> rays;
     for (size_t i = 0; i < work_.size(); ++i) {
       rays.push_back(-counters_.light_rays());
-      if (work_[i].has_indirect) IndirectRound(work_[i], 0, samples);
+      if (work_[i].has_indirect) IndirectRound(work_[i], 0, FirstSamples(work_[i]));
       Validate(map_.texels[begin_ + i], work_[i]);
       rays.back() += counters_.light_rays();
     }
-    if (Skips(Skip::kUnseenSky)) LeaveOutSky();
+    const int64_t distant = counters_.distant_found;
     for (size_t i = 0; i < work_.size(); ++i) {
       Work& work = work_[i];
       rays[i] -= counters_.light_rays();
-      if (work.has_direct) DirectRound(work, 0, samples);
+      if (work.has_direct) DirectRound(work, 0, static_cast<uint32_t>(options_.min_samples));
       rays[i] += counters_.light_rays();
       const float found = Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance());
       if (work.audited && work.valid) audit.Found(found, options_.mean_irradiance, rays[i]);
     }
+    if (Skips(Skip::kUnseenSky)) LeaveOutSky(counters_.distant_found - distant);
     audit.Count(counters_.skip);
     if (audit.passes()) CountDark(audit);
     return audit.passes();
@@ -174,22 +163,12 @@ class TileGatherer {
         {dark, std::ssize(work_), std::max<int64_t>(0, full - dark * kValidityFirstRays)});
   }
 
-  // Suns and sky, where no gather ray of the tile escaped and a few samples of every texel see none of them.
-  void LeaveOutSky() {
+  // Suns and sky, where no gather ray of the tile escaped and no sample of the first round found them.
+  void LeaveOutSky(int64_t found) {
     if (!scene_.lights.samples_distant()) return;
     const int64_t texels = std::count_if(work_.begin(), work_.end(), [](const Work& work) { return work.has_direct; });
     counters_.skip[Skip::kUnseenSky].of += texels;
-    if (escaped_ > 0 || texels < kWorthLeavingOut) return;
-    SkipAudit audit;
-    for (const Work& work : work_) {
-      if (!work.has_direct) continue;
-      Accumulator lost;
-      GatherDirect(scene_, work.sampler, *lights_, {}, Distant::kSampled, HashCombine(work.key, 0x5c1u), 0,
-                   kAuditSamples, lost, counters_);
-      audit.Found(Luminance(lost.Irradiance()), options_.mean_irradiance, 0);
-    }
-    audit.Count(counters_.skip);
-    if (!audit.passes()) return;
+    if (escaped_ > 0 || found > 0 || texels < kWorthLeavingOut) return;
     distant_ = Distant::kUnseen;
     counters_.skip[Skip::kUnseenSky].skipped += texels;
   }
@@ -242,10 +221,11 @@ class TileGatherer {
   // wholly inside other geometry starts again from its valid parts, or not at all.
   void Validate(const Texel& texel, Work& work) {
     std::optional<BacksSeen> backs;
-    if (work.indirect.count() > 0) backs = {work.backs / work.indirect.count(), work.nearest_back};
+    if (work.indirect.count() > 0)
+      backs = {work.backs / work.indirect.count(), work.nearest_back, work.indirect_samples};
     const TexelValidity validity =
         ProbeValidity(scene_.world, work.key, backs, Skips(Skip::kInvalidTexels) ? PartSearch::kNear : PartSearch::kAll,
-                      work.sampler);
+                      work.crowded, work.sampler);
     counters_.validity_rays += validity.rays;
     counters_.skip[Skip::kInvalidTexels].Add({validity.rays_saved > 0 ? 1 : 0, 1, validity.rays_saved});
     work.valid = validity.valid;
@@ -261,7 +241,7 @@ class TileGatherer {
       work.has_indirect = true;
       ChooseLights(texel, 3 * work.sampler.radius(), work);
     }
-    if (work.has_indirect) IndirectRound(work, 0, static_cast<uint32_t>(options_.min_samples));
+    if (work.has_indirect) IndirectRound(work, 0, FirstSamples(work));
   }
 
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
@@ -306,7 +286,7 @@ class TileGatherer {
   // Which of its neighbours each texel is connected to, on the grid and for the page's filter.
   void Connect() {
     const std::vector<uint8_t> open =
-        smooth_.emplace(map_, begin_, end_).Connect(scene_.world, Valid(), counters_.filter_rays);
+        smooth_.emplace(map_, begin_, end_).Connect(scene_.world, Valid(), Crowded(), counters_.filter_rays);
     for (size_t i = 0; i < work_.size(); ++i) work_[i].open = open[i];
   }
 
@@ -328,29 +308,35 @@ class TileGatherer {
       if (work.indirect_active) indirect.Add(work.indirect, Weighing(Luminance(work.indirect.Irradiance())));
     }
     for (Work& work : work_) {
-      if (work.direct_active && direct.sets() >= kTellingSets) work.direct_correction = direct.Correction();
-      if (work.indirect_active && indirect.sets() >= kTellingSets) work.indirect_correction = indirect.Correction();
+      if (work.direct_active && work.direct_samples >= kBlocks && direct.sets() >= kTellingSets)
+        work.direct_correction = direct.Correction();
+      if (work.indirect_active && work.indirect_samples >= kBlocks && indirect.sets() >= kTellingSets)
+        work.indirect_correction = indirect.Correction();
     }
   }
 
   // Who takes part in the next round.
   void Decide() {
     std::vector<float> direct, indirect, light;
+    std::vector<int> direct_samples, indirect_samples;
     for (const Work& work : work_) {
       direct.push_back(Luminance(work.DirectVariance()));
       indirect.push_back(Luminance(work.IndirectVariance()));
+      direct_samples.push_back(work.direct_samples);
+      indirect_samples.push_back(work.indirect_samples);
       light.push_back(Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance()));
     }
-    const auto pooled = [this, valid = Valid()](const std::vector<float>& values) {
-      return MeanOverNeighbours(map_, begin_, values, valid);
-    };
-    const std::vector<float> pooled_direct = pooled(direct);
-    std::vector<float> pooled_indirect = pooled(indirect);
+    const TilePool pool(map_, begin_, Valid());
+    const std::vector<float> pooled_direct = pool.Variance(direct, direct_samples);
+    std::vector<float> pooled_indirect = pool.Variance(indirect, indirect_samples);
     // A stray sample must not raise its own tolerance: neighbours or the smoothed light judge.
-    if (!Grant(pooled_direct, pooled_indirect, pooled(light)) || !options_.filter || options_.target_error <= 0) return;
+    const bool any = Grant(pooled_direct, pooled_indirect, pool.Mean(light));
+    if (!any || !options_.filter || options_.target_error <= 0) return;
     const std::vector<SmoothGrid::Smoothed> smooth = SmoothIndirect(indirect);
     for (size_t i = 0; i < work_.size(); ++i) {
-      pooled_indirect[i] = std::min(pooled_indirect[i], smooth[i].variance);
+      // What the window's texels say of their variance may have missed what is rare.
+      const float filtered = std::max(smooth[i].variance, smooth[i].square * pooled_indirect[i]);
+      pooled_indirect[i] = std::min(pooled_indirect[i], filtered);
       light[i] = Luminance(work_[i].direct.Irradiance()) + smooth[i].value;
     }
     Grant(pooled_direct, pooled_indirect, light);
@@ -366,7 +352,8 @@ class TileGatherer {
       const float tolerated = Tolerated(light[i]);
       const auto claim = [&](bool has, int samples, float cost, float variance) {
         const float error = variance > 0 ? std::min(variance / (kMargin * tolerated * tolerated), kBoundless) : 0;
-        claims.push_back({has ? error : 0, cost * static_cast<float>(samples), has && samples < options_.max_samples});
+        const int doublings = has ? std::bit_width(static_cast<unsigned>(options_.max_samples / samples)) - 1 : 0;
+        claims.push_back({has ? error : 0, cost * static_cast<float>(samples), doublings});
       };
       claim(work.has_direct, work.direct_samples, 1, direct[i]);
       claim(work.has_indirect, work.indirect_samples, kGatherCost, indirect[i]);
@@ -375,43 +362,11 @@ class TileGatherer {
         options_.target_error > 0 ? Allot(claims, texels) : std::vector<bool>(claims.size(), true);
     bool any = false;
     for (size_t i = 0; i < work_.size(); ++i) {
-      work_[i].direct_active = claims[2 * i].open && granted[2 * i];
-      work_[i].indirect_active = claims[2 * i + 1].open && granted[2 * i + 1];
+      work_[i].direct_active = claims[2 * i].doublings > 0 && granted[2 * i];
+      work_[i].indirect_active = claims[2 * i + 1].doublings > 0 && granted[2 * i + 1];
       any = any || work_[i].direct_active || work_[i].indirect_active;
     }
     return any;
-  }
-
-  // Variance of the texel's irradiance that comes from the finite number of photons.
-  static float PhotonVariance(const Work& work) {
-    if (work.indirect.count() <= 0) return 0;
-    float mean = 0, sum = 0;
-    for (const float g : work.group) mean += g / kVarianceGroups;
-    for (const float g : work.group) sum += (g - mean) * (g - mean);
-    const float n = work.indirect.count();
-    return sum / (n * n * kVarianceGroups * (kVarianceGroups - 1));
-  }
-
-  TexelLight Finish(const Work& work) const {
-    TexelLight light;
-    light.valid = work.valid;
-    light.backface_share = work.backface_share;
-    if (!work.valid) return light;
-    light.irradiance = work.direct.Irradiance() + work.indirect.Irradiance();
-    const RadianceSh direct = work.direct.Sh(), indirect = work.indirect.Sh();
-    for (size_t i = 0; i < kShCoefficients; ++i) light.sh.lambda[i] = direct.lambda[i] + indirect.lambda[i];
-    light.indirect = {work.indirect.Irradiance(), indirect, work.IndirectVariance()};
-    light.variance = work.DirectVariance() + light.indirect.variance;
-    // Photon noise is known in luminance; it is spread over the channels as the irradiance is.
-    const float luminance = Luminance(light.irradiance);
-    if (luminance > 0) {
-      const Rgb share = light.irradiance / luminance;
-      light.variance += share * share * PhotonVariance(work);
-    }
-    light.open = work.open;
-    light.direct_samples = work.direct_samples;
-    light.indirect_samples = work.indirect_samples;
-    return light;
   }
 
   const GatherScene& scene_;

@@ -1,5 +1,6 @@
 #include "worker/texel/validity.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "worker/sample/sobol.h"
@@ -112,12 +113,30 @@ TexelValidity ProbeWhole(const World& world, TexelSampler& sampler, const SobolS
 
 }  // namespace
 
+bool IsCrowded(const World& world, const AtlasLayout& layout, const Texel& texel, float radius) {
+  constexpr float kAboutFlat = 0.9f;  // cosine
+  constexpr int kMostVisited = 64;
+  bool crowded = false;
+  int visited = 0;
+  world.VisitNear(texel.position, 2 * radius, [&](uint32_t triangle) {
+    const Triangle& t = world.triangles()[triangle];
+    const std::vector<int32_t>& charts = layout.objects[t.object].chart_of_triangle;
+    const bool own = !charts.empty() && charts[t.index_in_object] == texel.chart;
+    const auto height = [&](Vec3f p) { return Dot(p - texel.position, texel.normal); };
+    const float rise = std::max({height(t.p0), height(t.p0 + t.e1), height(t.p0 + t.e2)});
+    const bool rises = rise > 4 * world.PointAt(triangle, 0, 0, false).offset;
+    crowded = (rises && !(own && Dot(t.normal, texel.normal) >= kAboutFlat)) || ++visited > kMostVisited;
+    return !crowded;
+  });
+  return crowded;
+}
+
 bool MeetsBack(const World& world, const Hit& hit) {
   return hit && hit.back && !world.MaterialOf(world.triangles()[hit.triangle]).double_sided;
 }
 
 TexelValidity ProbeValidity(const World& world, uint32_t key, const std::optional<BacksSeen>& seen, PartSearch search,
-                            TexelSampler& sampler) {
+                            bool crowded, TexelSampler& sampler) {
   TexelValidity result;
   if (world.backfaces() == BackfaceMode::kPass) return result;
   const SobolSet set(HashCombine(key, 0x7a11du));
@@ -128,6 +147,10 @@ TexelValidity ProbeValidity(const World& world, uint32_t key, const std::optiona
     if (result.backface_share == 0) return Saving(kCrowdRays, result);
     const bool outside = seen && result.backface_share <= kOutsideShare && seen->nearest > 2 * sampler.radius();
     const bool inside = result.backface_share > kInsideShare;
+    if (!crowded) {
+      if (outside && seen->rays >= kValidityFirstRays) return Saving(kPlaces * kPlaceRays, result);
+      return ProbeWhole(world, sampler, set, result);
+    }
     if ((outside || inside) && !Crowded(world, center, sampler.radius(), result.rays)) {
       return outside ? Saving(kPlaces * kPlaceRays, result) : ProbeWhole(world, sampler, set, result);
     }

@@ -9,6 +9,11 @@ namespace bakewell {
 
 inline constexpr int kValidityFirstRays = 8;  // where nobody knows yet
 
+// Whether anything but the about flat surface of the texel's own chart rises above its plane within two radii of its
+// centre (or so many triangles are there that it is not worth knowing). Where nothing does, nothing divides the texel
+// or stands between it and a neighbour.
+bool IsCrowded(const World& world, const AtlasLayout& layout, const Texel& texel, float radius);
+
 // What rays from a texel say about where it lies.
 struct TexelValidity {
   bool valid = true;         // some of it sees the open side of the scene
@@ -22,6 +27,7 @@ struct TexelValidity {
 struct BacksSeen {
   float share = 0;    // of back faces
   float nearest = 0;  // distance of the nearest of them [m]
+  int rays = 0;
 };
 
 // Finds the parts of a texel that lie inside other geometry (more than half of their hemisphere meets the back of a
@@ -31,10 +37,10 @@ struct BacksSeen {
 // BackfaceMode::kPass nothing has a back. Search::kNear trusts those rays where they start all over the texel: it looks
 // for parts only where some met a back face, and not where nothing stands within the texel's reach and either nearly
 // all of them did, and what holds for the centre holds for all of it, or few did and none near by, as a plate that
-// hangs over part of the texel would be.
+// hangs over part of the texel would be; nor in a texel that is not `crowded`.
 enum class PartSearch : uint8_t { kAll, kNear };
 TexelValidity ProbeValidity(const World& world, uint32_t key, const std::optional<BacksSeen>& seen, PartSearch search,
-                            TexelSampler& sampler);
+                            bool crowded, TexelSampler& sampler);
 
 // Whether a ray's first hit is the back of a single-sided surface.
 bool MeetsBack(const World& world, const Hit& hit);

@@ -4,6 +4,7 @@
 #include <immintrin.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 
@@ -251,6 +252,39 @@ bool World::Occluded(const Ray& ray) const {
   Fill(ray, query);
   rtcOccluded1(device_->scene, &context.rtc, &query);
   return query.tfar < 0;
+}
+
+void World::VisitNear(Vec3f center, float radius, absl::FunctionRef<bool(uint32_t triangle)> visit) const {
+  struct Visit {
+    const World* world;
+    Vec3f center;
+    float square;
+    absl::FunctionRef<bool(uint32_t)> visit;
+  } found{this, center, radius * radius, visit};
+  RTCPointQuery query{};
+  query.x = center.x;
+  query.y = center.y;
+  query.z = center.z;
+  query.radius = radius;
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  const auto function = [](RTCPointQueryFunctionArguments* arguments) {
+    auto& v = *static_cast<Visit*>(arguments->userPtr);
+    const uint32_t triangle = v.world->TriangleOf(arguments->geomID, arguments->primID);
+    const Triangle& t = v.world->triangles_[triangle];
+    const Vec3f p1 = t.p0 + t.e1, p2 = t.p0 + t.e2;
+    float square = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto [least, most] = std::minmax({t.p0[axis], p1[axis], p2[axis]});
+      const float gap = v.center[axis] - std::clamp(v.center[axis], least, most);
+      square += gap * gap;
+    }
+    if (square > v.square || v.visit(triangle)) return false;
+    arguments->query->radius = 0;
+    v.square = -1;  // nor those of the same leaf
+    return true;
+  };
+  rtcPointQuery(device_->scene, &query, &context, function, &found);
 }
 
 namespace {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <absl/functional/function_ref.h>
+
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -61,6 +63,8 @@ class World {
 
   Hit Intersect(const Ray& ray) const;
   bool Occluded(const Ray& ray) const;
+  // Triangles whose bounds meet a sphere, in no particular order, until `visit` returns false.
+  void VisitNear(Vec3f center, float radius, absl::FunctionRef<bool(uint32_t triangle)> visit) const;
 
   const Scene& scene() const { return scene_; }
   const std::vector<Triangle>& triangles() const { return triangles_; }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/statistics.h"
 
 namespace bakewell {
@@ -21,6 +23,31 @@ TEST(Accumulator, MeanAndShAreOverTheCountedSamples) {
   EXPECT_NEAR(sum.Sh().lambda[0].z, 4 * 0.282095 * 7 / 15, 1e-5);
   EXPECT_NEAR(sum.Sh().lambda[2].x, 0.488603 * 7 / 15, 1e-5);
   EXPECT_EQ(sum.Sh().lambda[3].x, 0);
+}
+
+// Two samples are two blocks, and the estimate goes on from there as if there had been more.
+TEST(Accumulator, FewSamplesTellTheirVarianceToo) {
+  TestRandom random(5);
+  double estimated = 0, spread = 0;
+  constexpr int kSets = 4000;
+  for (int set = 0; set < kSets; ++set) {
+    Accumulator sum;
+    for (uint32_t begin = 0, planned = 2; planned <= 16; begin = planned, planned *= 2) {
+      if (begin > 0) sum.Double();
+      for (uint32_t i = begin; i < planned; ++i) {
+        sum.Count();
+        const auto value = static_cast<float>(random.Unit());
+        sum.AddIrradiance(i, planned, {value, value, value});
+      }
+      if (planned == 2) estimated += static_cast<double>(sum.Variance().x) / kSets;
+      if (planned == 2) spread += std::pow(static_cast<double>(sum.Irradiance().x) - 0.5, 2) / kSets;
+      EXPECT_EQ(sum.blocks(), std::min(planned, 8U));
+    }
+    EXPECT_GT(sum.Variance().x, 0);
+    EXPECT_LT(sum.Variance().x, 0.05f);
+  }
+  EXPECT_NEAR(spread, 1.0 / 24, 0.003);
+  EXPECT_NEAR(estimated, spread, 0.004);
 }
 
 TEST(Accumulator, NothingCountedIsZeroAndNotNan) {

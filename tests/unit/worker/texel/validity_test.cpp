@@ -30,8 +30,19 @@ Probed Probe(const Scene& scene, int x, int y, BackfaceMode mode = BackfaceMode:
   const PreparedLevel prepared = PrepareInMemory(scene, settings);
   const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * y + x)]];
   TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-  const TexelValidity validity = ProbeValidity(*prepared.world, 1, std::nullopt, PartSearch::kAll, sampler);
+  const TexelValidity validity = ProbeValidity(*prepared.world, 1, std::nullopt, PartSearch::kAll, true, sampler);
   return {validity, sampler.valid_mask()};
+}
+
+// Texels are 1 m wide: two radii are 1.41 m. The box's nearest side is at x = 5.
+TEST(IsCrowded, WhereSomethingElseRisesWithinTwoRadii) {
+  const Scene scene = FloorWithBox(5, 6, 0, 8);
+  const PreparedLevel prepared = PrepareInMemory(scene, {});
+  for (int x = 0; x < 8; ++x) {
+    const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 3 + x)]];
+    const TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
+    EXPECT_EQ(IsCrowded(*prepared.world, prepared.layout, texel, sampler.radius()), x >= 4 && x <= 6) << x;
+  }
 }
 
 TEST(ProbeValidity, TexelDeepUnderABoxIsInvalid) {
@@ -76,8 +87,8 @@ TEST(ProbeValidity, NearSearchFindsTheSameWithFewerRays) {
     const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(24 + x)]];
     TexelSampler all(*prepared.world, prepared.layout, prepared.texels, texel), near = all;
     const BacksSeen seen{share, 0.5f};
-    const TexelValidity a = ProbeValidity(*prepared.world, 1, seen, PartSearch::kAll, all);
-    const TexelValidity b = ProbeValidity(*prepared.world, 1, seen, PartSearch::kNear, near);
+    const TexelValidity a = ProbeValidity(*prepared.world, 1, seen, PartSearch::kAll, true, all);
+    const TexelValidity b = ProbeValidity(*prepared.world, 1, seen, PartSearch::kNear, true, near);
     EXPECT_EQ(a.valid, b.valid) << x;
     EXPECT_EQ(a.pushed_out, b.pushed_out) << x;
     EXPECT_EQ(all.valid_mask(), near.valid_mask()) << x;
@@ -94,7 +105,8 @@ TEST(ProbeValidity, BackFacesInTheDistanceDivideNoTexel) {
   const PreparedLevel prepared = PrepareInMemory(scene, {});
   const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 4 + 4)]];
   TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-  const TexelValidity validity = ProbeValidity(*prepared.world, 1, BacksSeen{0.2f, 4}, PartSearch::kNear, sampler);
+  const TexelValidity validity =
+      ProbeValidity(*prepared.world, 1, BacksSeen{0.2f, 4}, PartSearch::kNear, true, sampler);
   EXPECT_TRUE(validity.valid);
   EXPECT_EQ(sampler.valid_mask(), 0xffff);
   EXPECT_EQ(validity.rays, 8);
@@ -114,7 +126,7 @@ TEST(ProbeValidity, APlateThatHangsOverPartOfATexelDividesIt) {
   for (const float share : {0.2f, 0.6f, 0.85f}) {
     TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
     const TexelValidity validity =
-        ProbeValidity(*prepared.world, 1, BacksSeen{share, 0.02f}, PartSearch::kNear, sampler);
+        ProbeValidity(*prepared.world, 1, BacksSeen{share, 0.02f}, PartSearch::kNear, true, sampler);
     EXPECT_TRUE(validity.valid) << share;
     EXPECT_EQ(sampler.valid_mask(), 0x3333) << share;
   }

@@ -7,7 +7,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <limits>
+#include <set>
 #include <thread>
 
 #include "tests/support/scene_builder.h"
@@ -72,6 +74,38 @@ TEST(World, HitTellsTriangleDistanceBarycentricsAndSide) {
     EXPECT_EQ(world->PointAt(back).normal, (Vec3f{0, 0, -1}));
   }
   EXPECT_FALSE(world->Intersect(Down(0.6f, 0)));
+}
+
+TEST(World, VisitsWhatIsNearUntilToldToStop) {
+  TestRandom random(7);
+  SceneBuilder builder;
+  const auto place = [&] { return Vec3d{4 * random.Unit(), 4 * random.Unit(), 4 * random.Unit()}; };
+  for (int i = 0; i < 200; ++i) {
+    builder.AddQuad(place(), Vec3d{0.2, 0, 0} * random.Unit(), Vec3d{0, 0.1, 0.3} * random.Unit(),
+                    {.lightmapped = false});
+  }
+  const Scene scene = builder.Build();
+  const auto world = Build(scene);
+  for (int i = 0; i < 50; ++i) {
+    const Vec3f center = ToFloat(place());
+    const float radius = 0.5f;
+    std::set<uint32_t> expected, found;
+    for (uint32_t k = 0; k < world->triangles().size(); ++k) {
+      const Triangle& t = world->triangles()[k];
+      float square = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto [least, most] = std::minmax({t.p0[axis], (t.p0 + t.e1)[axis], (t.p0 + t.e2)[axis]});
+        square += std::pow(std::max({least - center[axis], center[axis] - most, 0.0f}), 2.0f);
+      }
+      if (square < radius * radius) expected.insert(k);
+    }
+    world->VisitNear(center, radius, [&](uint32_t triangle) { return found.insert(triangle).second; });
+    EXPECT_EQ(found, expected);
+    // Symptom: the others of a leaf were visited all the same.
+    size_t visits = 0;
+    world->VisitNear(center, radius, [&](uint32_t) { return ++visits < 2; });
+    EXPECT_EQ(visits, std::min<size_t>(expected.size(), 2));
+  }
 }
 
 TEST(AlphaRange, HoldsEverySampleOfTheTriangle) {

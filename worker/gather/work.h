@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "worker/gather/accumulate.h"
+#include "worker/gather/direct.h"
+#include "worker/gather/guide.h"
+#include "worker/gather/tile.h"
+
+namespace bakewell {
+
+// Everything about one texel while its tile is in flight.
+struct TexelWork {
+  explicit TexelWork(TexelSampler its_sampler) : sampler(std::move(its_sampler)) {}
+
+  TexelSampler sampler;
+  TileLights::Choice choice{};
+  uint32_t key = 0;
+  bool valid = true;
+  bool crowded = true;                 // IsCrowded
+  bool dark = false, audited = false;  // to be left out; but computed all the same
+  uint8_t open = 0;
+  float direct_correction = 1, indirect_correction = 1;  // of the accumulators' variances
+  float backs = 0, nearest_back = std::numeric_limits<float>::infinity(),
+        backface_share = 0;                             // gather rays that met a back face [m], their share
+  bool has_direct = true, has_indirect = true;          // there is something to sample
+  bool direct_active = false, indirect_active = false;  // in the next round
+  Accumulator direct{}, indirect{};
+  std::optional<GatherGuide> guide{};          // of gather rays, once there are kGuidedFrom
+  bool guided = false;                         // a guide was looked for
+  std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
+  int direct_samples = 0, indirect_samples = 0;
+
+  Rgb DirectVariance() const { return direct.Variance() * direct_correction; }
+  Rgb IndirectVariance() const { return indirect.Variance() * indirect_correction; }
+
+  // Variance of the texel's irradiance that comes from the finite number of photons.
+  float PhotonVariance() const {
+    if (indirect.count() <= 0) return 0;
+    float mean = 0, sum = 0;
+    for (const float g : group) mean += g / kVarianceGroups;
+    for (const float g : group) sum += (g - mean) * (g - mean);
+    const float n = indirect.count();
+    return sum / (n * n * kVarianceGroups * (kVarianceGroups - 1));
+  }
+
+  TexelLight Finish() const {
+    TexelLight light;
+    light.valid = valid;
+    light.backface_share = backface_share;
+    if (!valid) return light;
+    light.irradiance = direct.Irradiance() + indirect.Irradiance();
+    const RadianceSh direct_sh = direct.Sh(), indirect_sh = indirect.Sh();
+    for (size_t i = 0; i < kShCoefficients; ++i) light.sh.lambda[i] = direct_sh.lambda[i] + indirect_sh.lambda[i];
+    light.indirect = {indirect.Irradiance(), indirect_sh, IndirectVariance()};
+    light.variance = DirectVariance() + light.indirect.variance;
+    // Photon noise is known in luminance; it is spread over the channels as the irradiance is.
+    const float luminance = Luminance(light.irradiance);
+    if (luminance > 0) {
+      const Rgb share = light.irradiance / luminance;
+      light.variance += share * share * PhotonVariance();
+    }
+    light.open = open;
+    light.direct_samples = direct_samples;
+    light.indirect_samples = indirect_samples;
+    return light;
+  }
+};
+
+}  // namespace bakewell
