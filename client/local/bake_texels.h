@@ -4,7 +4,7 @@
 
 #include "client/local/level_bake.h"
 #include "worker/finish/filter.h"
-#include "worker/level/level.h"
+#include "worker/level/photons.h"
 
 namespace bakewell {
 

@@ -25,23 +25,26 @@ struct Photons {
   RadianceCache cache;
 };
 
-absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSettings& settings, int64_t count,
-                                     BakedTexels& baked, PhaseClock& clock, Progress& progress) {
+absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSettings& settings, BakedTexels& baked,
+                                     PhaseClock& clock, Progress& progress) {
   const World& world = *prepared.world;
   const LightSet& lights = *prepared.lights;
   Photons result;
   clock.Begin("photons");
-  const EmissionGuide guide = EmissionGuide::Learn(world, lights, prepared.layout, prepared.texels,
-                                                   EmissionGuide::WalksFor(lights, count), settings.seed);
-  const PhotonPlan plan = PlanPhotons(lights, guide, count, settings.seed);
-  result.cells = SurfaceCells::Build(world, CellsFor(count), guide.seen());
+  const auto starts = [&](int walks) {
+    return EmissionGuide::StartsIn(world, prepared.layout, prepared.texels, walks, settings.seed);
+  };
+  const PhotonScene scene{world, lights, std::ssize(prepared.texels.texels), starts};
+  const auto stage = BuildPhotonStage(scene, PhotonsFor(scene, settings, progress), settings.seed);
+  const PhotonPlan& plan = stage->plan;
+  result.cells = stage->cells;
   PhotonMap map;
   map.flux.resize(2 * result.cells.cells().size());
   const int batches = settings.photon_batches;
   std::atomic<int> done{0};
   tbb::parallel_for(0, batches, [&](int batch) {
     const FlushDenormals mode;
-    EmitPhotons(world, lights, guide, result.cells, plan, plan.photons * batch / batches,
+    EmitPhotons(world, lights, stage->guide, result.cells, plan, plan.photons * batch / batches,
                 plan.photons * (batch + 1) / batches, progress, map);
     progress.Report("photons", ++done, batches);
   });
@@ -65,8 +68,7 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
                                        Progress& progress) {
   BakedTexels baked;
   Budget budget = BudgetOf(settings, std::ssize(prepared.texels.texels));
-  BAKEWELL_ASSIGN_OR_RETURN(const Photons photons,
-                            TracePhotons(prepared, settings, budget.photons, baked, clock, progress));
+  BAKEWELL_ASSIGN_OR_RETURN(const Photons photons, TracePhotons(prepared, settings, baked, clock, progress));
   clock.Begin("gather");
   const LightTree tree(*prepared.lights);
   const GatherScene scene{*prepared.world, *prepared.lights, tree, photons.cells, photons.cache};

@@ -21,6 +21,7 @@ using std::chrono::microseconds;
 // scheduler corrects them by what it sees.
 constexpr double kPhotonUs = 1;
 constexpr double kSampleUs = 2.5;
+constexpr double kPilotUs = 100'000;
 constexpr double kFinishUs = 500'000;
 constexpr double kReportUs = 20'000;
 constexpr int64_t kTaskBytes = int64_t{256} << 20;  // level, photons and cache of a middling scene
@@ -64,10 +65,11 @@ std::string SettingsFor(const KindName& kind, BakeSettings settings) {
     counted.no_skip = settings.no_skip;
     return SettingsJson(counted);
   }
+  if (kind.kind == level_task::kFinish.kind) settings.photons = defaults.photons;
   if (kind.kind == level_task::kGather.kind) return SettingsJson(settings);
   const bool finishes = kind.kind == level_task::kFinish.kind;
   settings.filter = finishes ? settings.filter : defaults.filter;
-  if (!finishes) settings.target_error = defaults.target_error;
+  if (!finishes && kind.kind != level_task::kSurvey.kind) settings.target_error = defaults.target_error;
   settings.min_samples = defaults.min_samples;
   settings.max_samples = defaults.max_samples;
   return SettingsJson(settings);
@@ -236,7 +238,7 @@ absl::StatusOr<TaskGraph> LevelPlanner::Plan(const PlanRequest& request, const B
   BAKEWELL_RETURN_IF_ERROR(CheckTexels(*scene, context.settings, limits_.max_texels));
   TaskGraph graph;
   context.chart = Add(graph, MakeTask(context, level_task::kChart, 0, 0, 50 * triangles));
-  PlannedTask survey = MakeTask(context, level_task::kSurvey, 0, 0, 20 * triangles);
+  PlannedTask survey = MakeTask(context, level_task::kSurvey, 0, 0, kPilotUs + 20 * triangles);
   Need(survey, "layout", context.chart, "layout");
   graph.next_stage_after = Add(graph, std::move(survey));
   return graph;
@@ -247,6 +249,7 @@ absl::StatusOr<TaskGraph> LevelPlanner::Continue(const PlanRequest& request, con
   Context context{request.scene, so_far[0].tasks[0].key, {}, TaskUs()};
   BAKEWELL_ASSIGN_OR_RETURN(context.settings, ReadSettings(request.settings));
   BAKEWELL_ASSIGN_OR_RETURN(const level_task::Survey survey, SurveyFrom(done, read));
+  context.settings.photons = static_cast<int64_t>(survey.photons);
   const double texel_us = kSampleUs * SamplesOf(context.settings.quality);
   TaskGraph graph;
   const TaskKey cache = AddPhotons(context, survey, graph);

@@ -96,6 +96,7 @@ TEST(LevelExecutor, StoppedPhotonsAreNoResult) {
   BakeSettings settings;
   settings.quality = Quality::kPreview;
   settings.resolution = 32;
+  settings.photons = 100000;  // which the survey says to the tasks after it
   const std::string task = level_task::Serialize({SettingsJson(settings), 0, 1});
   const auto layout =
       ChartTasks()[0].run({level_task::kChart.kind, level_task::kChart.code_version, task, {}}, {scene});

@@ -81,13 +81,18 @@ MadeOutputs Previews(const TexelMap& map, int begin, std::span<const GatheredTil
   return outputs;
 }
 
-// Level and photons do not depend on how well texels are to be gathered.
-std::string LevelSettings(const BakeSettings& settings) {
+// Photons do not depend on how well texels are to be gathered, the level not on how many photons there are.
+std::string PhotonSettings(const BakeSettings& settings) {
   BakeSettings relevant = settings;
   relevant.target_error = 0;
   relevant.min_samples = relevant.max_samples = 0;
   relevant.filter = true;
   return SettingsJson(relevant);
+}
+std::string LevelSettings(const BakeSettings& settings) {
+  BakeSettings relevant = settings;
+  relevant.photons = 0;
+  return PhotonSettings(relevant);
 }
 
 }  // namespace
@@ -155,8 +160,13 @@ absl::StatusOr<std::shared_ptr<const Level>> LevelExecutor::LevelOf(const Work& 
 }
 
 absl::StatusOr<std::shared_ptr<const PhotonStage>> LevelExecutor::PhotonStageOf(const Work& work, const Level& level) {
-  const Digest key = KeyOfInputs(work.spec, {"scene", "layout"}, LevelSettings(work.settings));
-  return photon_stages_.Get(key, [&]() -> Recent<PhotonStage>::Made { return BuildPhotonStage(level, work.settings); });
+  const Digest key = KeyOfInputs(work.spec, {"scene", "layout"}, PhotonSettings(work.settings));
+  return photon_stages_.Get(key, [&]() -> Recent<PhotonStage>::Made {
+    if (work.settings.photons <= 0) return absl::InvalidArgumentError("the task does not say how many photons");
+    const auto starts = [&](int walks) { return StartsOf(level, walks, work.settings.seed); };
+    return BuildPhotonStage({*level.world, *level.lights, level.texels->texel_count(), starts}, work.settings.photons,
+                            work.settings.seed);
+  });
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
@@ -164,7 +174,13 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
   BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
   level_task::Survey survey;
   survey.texels = static_cast<uint64_t>(level->texels->texel_count());
-  survey.photons = static_cast<uint64_t>(level->photons);
+  StopProgress progress(work.stop, nullptr);
+  InArena([&] {
+    const auto starts = [&](int walks) { return StartsOf(*level, walks, work.settings.seed); };
+    survey.photons = static_cast<uint64_t>(
+        PhotonsFor({*level->world, *level->lights, level->texels->texel_count(), starts}, work.settings, progress));
+  });
+  if (work.stop.stop_requested()) return absl::CancelledError("stopped");
   survey.opaque_alpha = level->world->opaque_alpha();
   for (const TexelPages::PageCount& page : level->texels->pages()) {
     survey.overlapping_texels += static_cast<uint64_t>(page.overlapping_texels);
@@ -177,7 +193,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Emit(const Work& work) {
   BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
-  Say("photons", photons_done_, std::max<int64_t>(1, level->photons));
+  Say("photons", photons_done_, std::max<int64_t>(1, work.settings.photons));
   BAKEWELL_ASSIGN_OR_RETURN(const auto stage, PhotonStageOf(work, *level));
   StopProgress progress(work.stop, nullptr);
   PhotonMap map;

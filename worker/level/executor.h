@@ -8,7 +8,7 @@
 
 #include "core/artifact/level_task.h"
 #include "core/artifact/progress.h"
-#include "worker/level/level.h"
+#include "worker/level/photons.h"
 #include "worker/task/executor.h"
 
 namespace bakewell {

@@ -17,9 +17,9 @@ struct QualityNumbers {
 QualityNumbers NumbersOf(Quality quality) {
   switch (quality) {
     case Quality::kPreview:
-      return {8, 256, 6, 0.08f};
+      return {4, 256, 6, 0.08f};
     case Quality::kMedium:
-      return {8, 512, 24, 0.04f};
+      return {4, 512, 24, 0.04f};
     case Quality::kHigh:
       break;
   }
@@ -30,12 +30,6 @@ constexpr int64_t kLeastPhotons = 32768;
 constexpr int64_t kMostPhotons = 4'000'000'000;  // their cells and the cache fit into 4 GB
 
 }  // namespace
-
-// Cells grow in number more slowly than photons, so that both the blur and the noise of the cache go to zero.
-int64_t CellsFor(int64_t photons) {
-  const double root = std::cbrt(static_cast<double>(photons));
-  return std::max<int64_t>(1024, static_cast<int64_t>(4 * root * root));
-}
 
 bool Filters(const BakeSettings& settings) { return settings.filter && settings.quality != Quality::kHigh; }
 
@@ -53,8 +47,12 @@ Budget BudgetOf(const BakeSettings& settings, int64_t texels) {
   budget.gather.seed = settings.seed;
   budget.gather.filter = Filters(settings);
   budget.gather.no_skip = settings.no_skip;
-  budget.photons = settings.photons > 0 ? settings.photons
-                                        : std::clamp(texels * numbers.photons_per_texel, kLeastPhotons, kMostPhotons);
+  const int64_t usual = numbers.photons_per_texel * texels;
+  // An error of one's own choice may need more than the quality's.
+  const int64_t most = settings.target_error > 0 ? NumbersOf(Quality::kHigh).photons_per_texel * texels : usual;
+  budget.least_photons = kLeastPhotons;
+  budget.most_photons = std::clamp(most, kLeastPhotons, kMostPhotons);
+  if (settings.photons > 0) budget.least_photons = budget.most_photons = settings.photons;
   return budget;
 }
 
@@ -71,29 +69,10 @@ absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout
     return absl::InvalidArgumentError(
         "no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");
   }
-  level->photons = BudgetOf(settings, level->texels->texel_count()).photons;
   return level;
 }
 
 namespace {
-
-// Where the guide's walks start, page by page.
-std::vector<TexelPoint> StartsOf(const Level& level, int walks, uint32_t seed) {
-  const TexelPages& texels = *level.texels;
-  std::vector<TexelPoint> points(static_cast<size_t>(walks));
-  for (int page = 0; page < static_cast<int>(texels.pages().size()); ++page) {
-    const TexelPages::PageCount& count = texels.pages()[static_cast<size_t>(page)];
-    const auto map = texels.Page(page);
-    for (int walk = 0; walk < walks; ++walk) {
-      const auto start = EmissionGuide::StartOf(walk, static_cast<size_t>(texels.texel_count()), seed);
-      const int64_t texel = static_cast<int64_t>(start.texel) - count.first_texel;
-      if (texel < 0 || texel >= count.texels) continue;
-      const TexelSampler sampler(*level.world, level.layout, *map, map->texels[static_cast<size_t>(texel)]);
-      points[static_cast<size_t>(walk)] = sampler.At(start.u);
-    }
-  }
-  return points;
-}
 
 // Adds the luminance that the photons brought to each texel to `sum`, in order.
 double AddIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache, double sum) {
@@ -106,17 +85,6 @@ double AddIrradiance(const TexelMap& texels, const SurfaceCells& cells, const Ra
 }
 
 }  // namespace
-
-std::shared_ptr<const PhotonStage> BuildPhotonStage(const Level& level, const BakeSettings& settings) {
-  const int64_t count = level.photons;
-  const int walks = EmissionGuide::WalksFor(*level.lights, count);
-  auto stage = std::make_shared<PhotonStage>();
-  stage->guide =
-      EmissionGuide::Learn(*level.world, *level.lights, StartsOf(level, walks, settings.seed), settings.seed);
-  stage->plan = PlanPhotons(*level.lights, stage->guide, count, settings.seed);
-  stage->cells = SurfaceCells::Build(*level.world, CellsFor(count), stage->guide.seen());
-  return stage;
-}
 
 float MeanIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache) {
   if (texels.texels.empty()) return 0;

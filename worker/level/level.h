@@ -18,7 +18,7 @@ namespace bakewell {
 // Samples, photons and target of a quality, with the settings' own numbers in their place.
 struct Budget {
   GatherOptions gather;
-  int64_t photons = 0;
+  int64_t least_photons = 0, most_photons = 0;  // PhotonsFor chooses
 };
 // Whether indirect light is filtered: at high quality there is little noise that a filter could take for nothing
 // (worker/filter/README.md).
@@ -36,21 +36,9 @@ struct Level {
   std::unique_ptr<World> world;
   std::unique_ptr<LightSet> lights;
   std::unique_ptr<TexelPages> texels;
-  int64_t photons = 0;  // to be emitted
 };
 // kInvalidArgument: no lightmapped surface covers a texel.
 absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout layout, const BakeSettings& settings);
-
-// Who emits what, and the cells that photons land in.
-struct PhotonStage {
-  EmissionGuide guide;
-  PhotonPlan plan;
-  SurfaceCells cells;
-};
-std::shared_ptr<const PhotonStage> BuildPhotonStage(const Level& level, const BakeSettings& settings);
-
-// How many cells the photons are stored in.
-int64_t CellsFor(int64_t photons);
 
 // Mean luminance that the photons brought to the fronts of lightmapped surfaces, to judge errors against.
 float MeanIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache);

@@ -117,14 +117,19 @@ int EmissionGuide::WalksFor(const LightSet& lights, int64_t photons) {
   return static_cast<int>(std::min<int64_t>(photons / 16, distant ? 100'000 : 20'000));
 }
 
-EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, const AtlasLayout& layout,
-                                   const TexelMap& map, int walks, uint32_t seed) {
+std::vector<TexelPoint> EmissionGuide::StartsIn(const World& world, const AtlasLayout& layout, const TexelMap& map,
+                                                int walks, uint32_t seed) {
   std::vector<TexelPoint> starts;
   for (int walk = 0; walk < walks && !map.texels.empty(); ++walk) {
     const Start start = StartOf(walk, map.texels.size(), seed);
     starts.push_back(TexelSampler(world, layout, map, map.texels[start.texel]).At(start.u));
   }
-  return Learn(world, lights, starts, seed);
+  return starts;
+}
+
+EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, const AtlasLayout& layout,
+                                   const TexelMap& map, int walks, uint32_t seed) {
+  return Learn(world, lights, StartsIn(world, layout, map, walks, seed), seed);
 }
 
 EmissionGuide EmissionGuide::Learn(const World& world, const LightSet& lights, std::span<const TexelPoint> starts,

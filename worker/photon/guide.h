@@ -26,6 +26,9 @@ class EmissionGuide {
     Vec2f u;
   };
   static Start StartOf(int walk, size_t texels, uint32_t seed);
+  // The points that the first `walks` walks start at, in a map of all texels.
+  static std::vector<TexelPoint> StartsIn(const World& world, const AtlasLayout& layout, const TexelMap& map, int walks,
+                                          uint32_t seed);
   // Walks for a bake of `photons`.
   static int WalksFor(const LightSet& lights, int64_t photons);
   // starts[walk] is the point that StartOf(walk) means. Keyed by seed.

@@ -35,7 +35,9 @@ absl::StatusOr<std::unique_ptr<KernelLevel>> LoadKernelLevel(const std::string& 
   const Level& level = *made->level;
   made->texels = level.texels->Page(0);
   settings.photons = kPhotonsPerTexel * level.texels->texel_count();
-  made->stage = BuildPhotonStage(level, settings);
+  const auto starts = [&](int walks) { return StartsOf(level, walks, settings.seed); };
+  made->stage = BuildPhotonStage({*level.world, *level.lights, level.texels->texel_count(), starts}, settings.photons,
+                                 settings.seed);
   made->photons.flux.resize(2 * made->stage->cells.cells().size());
   NoProgress progress;
   EmitPhotons(*level.world, *level.lights, made->stage->guide, made->stage->cells, made->stage->plan, 0,

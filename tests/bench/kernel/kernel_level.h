@@ -3,7 +3,7 @@
 #include <string>
 
 #include "tests/bench/kernel/embree_rays.h"
-#include "worker/level/level.h"
+#include "worker/level/photons.h"
 #include "worker/light/tree.h"
 
 namespace bakewell {
