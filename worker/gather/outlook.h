@@ -10,9 +10,10 @@ namespace bakewell {
 // What few photons and few rays say about a gather over more of both. Variances are of the texels' irradiance, over
 // mean * max(irradiance, floor_share * mean), as means over the points looked at; 0 where there is no light.
 struct GatherOutlook {
-  double photon_variance = 0;  // by the finite number of photons, however many rays look; falls as one over them
-  double ray_variance = 0;     // of one gather ray
-  double bounces = 0;          // near hits and cut cells, a gather ray
+  double photon_variance =
+      0;                    // by the finite number of photons, however many rays look; falls as their number or slower
+  double ray_variance = 0;  // of one gather ray
+  double bounces = 0;       // near hits and cut cells, a gather ray
 };
 
 // points: places of texels drawn at random. Every group of photons is an estimate of its own; two sets of rays from the

@@ -11,9 +11,9 @@
 namespace bakewell {
 namespace {
 
-constexpr int64_t kLeastPilot = 32768, kMostPilot = 262144;  // photons
-constexpr int64_t kPilotShare = 32;                          // of the most that may be needed
-constexpr int64_t kWorthAPilot = 4;                          // times as many may be needed
+constexpr int64_t kPilot = 32768, kNextPilot = 8, kMostPilot = 262144;  // photons
+constexpr int64_t kWorthAPilot = 4;                                     // times its photons may be needed
+constexpr int64_t kTrusted = 16;  // times its photons a pilot may ask for; else a larger one is asked
 constexpr int kPilotPoints = 512;
 constexpr double kPhotonShare = 0.35;  // of the target error
 constexpr double kSetShare = 0.3;      // of the samples that independent rays would need: sets, filter and guide
@@ -60,13 +60,17 @@ std::shared_ptr<const PhotonStage> BuildPhotonStage(const PhotonScene& scene, in
   return stage;
 }
 
-int64_t PhotonsFor(const PhotonScene& scene, const BakeSettings& settings, const Progress& progress) {
-  const Budget budget = BudgetOf(settings, scene.texels);
-  const int64_t pilot = std::clamp(budget.most_photons / kPilotShare, kLeastPilot, kMostPilot);
-  if (budget.most_photons == budget.least_photons || budget.most_photons < kWorthAPilot * pilot) {
-    return budget.most_photons;
-  }
-  const auto stage = BuildPhotonStage(scene, pilot, settings.seed);
+namespace {
+
+// What a gather would find over `photons`.
+struct Pilot {
+  GatherOutlook outlook;
+  double photons = 0;
+};
+
+Pilot FlyPilot(const PhotonScene& scene, const BakeSettings& settings, float floor_share, int64_t photons,
+               const Progress& progress) {
+  const auto stage = BuildPhotonStage(scene, photons, settings.seed);
   PhotonMap map;
   map.flux.resize(2 * stage->cells.cells().size());
   constexpr int kParts = 8;
@@ -78,22 +82,40 @@ int64_t PhotonsFor(const PhotonScene& scene, const BakeSettings& settings, const
   NoProgress unheard;
   const RadianceCache cache =
       EstimateDensity(scene.world, stage->cells, map, stage->plan, DensityOf(settings), unheard);
-  if (progress.Cancelled()) return 0;
   const LightTree tree(scene.lights);
-  const GatherOutlook outlook = LookAhead({scene.world, scene.lights, tree, stage->cells, cache},
-                                          scene.starts(kPilotPoints), budget.gather.floor_share, settings.seed);
-  const auto emitted = static_cast<double>(stage->plan.photons), texels = static_cast<double>(scene.texels);
-  const double target = static_cast<double>(budget.gather.target_error), share = kPhotonShare * target;
-  const double for_noise = outlook.photon_variance / (share * share) * emitted;
-  const double samples =
-      std::clamp(kSetShare * outlook.ray_variance / (target * target), static_cast<double>(budget.gather.min_samples),
-                 static_cast<double>(budget.gather.max_samples));
+  return {LookAhead({scene.world, scene.lights, tree, stage->cells, cache}, scene.starts(kPilotPoints), floor_share,
+                    settings.seed),
+          static_cast<double>(stage->plan.photons)};
+}
+
+// Enough for their noise, and for gather rays that need not bounce on where cells are large.
+double Needed(const Pilot& pilot, const GatherOptions& gather, int64_t texels) {
+  const auto target = static_cast<double>(gather.target_error);
+  const double share = kPhotonShare * target;
+  const double for_noise = pilot.outlook.photon_variance / (share * share) * pilot.photons;
+  const double samples = std::clamp(kSetShare * pilot.outlook.ray_variance / (target * target),
+                                    static_cast<double>(gather.min_samples), static_cast<double>(gather.max_samples));
   // Where photons p^b cost as much as a bounce saves: the derivative of photons + bounces by p is zero.
-  const double bounces = texels * samples * outlook.bounces;
+  const double bounces = static_cast<double>(texels) * samples * pilot.outlook.bounces;
   const double for_cost =
-      std::pow(kBounceCost * kBounceFall * bounces * std::pow(emitted, kBounceFall), 1 / (1 + kBounceFall));
-  const double needed = std::min(std::max(for_noise, for_cost), static_cast<double>(budget.most_photons));
-  return std::clamp(static_cast<int64_t>(needed), budget.least_photons, budget.most_photons);
+      std::pow(kBounceCost * kBounceFall * bounces * std::pow(pilot.photons, kBounceFall), 1 / (1 + kBounceFall));
+  return std::max(for_noise, for_cost);
+}
+
+}  // namespace
+
+int64_t PhotonsFor(const PhotonScene& scene, const BakeSettings& settings, const Progress& progress) {
+  const Budget budget = BudgetOf(settings, scene.texels);
+  const auto most = static_cast<double>(budget.most_photons);
+  if (budget.most_photons == budget.least_photons) return budget.most_photons;
+  double needed = most;
+  for (int64_t pilot = kPilot; pilot <= kMostPilot && kWorthAPilot * pilot <= budget.most_photons;
+       pilot *= kNextPilot) {
+    needed = Needed(FlyPilot(scene, settings, budget.gather.floor_share, pilot, progress), budget.gather, scene.texels);
+    if (progress.Cancelled()) return 0;
+    if (needed <= static_cast<double>(kTrusted * pilot)) break;
+  }
+  return std::clamp(static_cast<int64_t>(std::min(needed, most)), budget.least_photons, budget.most_photons);
 }
 
 }  // namespace bakewell

@@ -1,0 +1,100 @@
+#include "worker/level/photons.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "tests/support/bake_scene.h"
+#include "tests/support/scene_builder.h"
+#include "tests/support/skip_levels.h"
+#include "worker/gather/outlook.h"
+
+namespace bakewell {
+namespace {
+
+constexpr uint32_t kSeed = 5;
+
+// A level with everything that photons need, for as long as it lives.
+struct Prepared {
+  PreparedLevel level;
+  explicit Prepared(const Scene& scene) : level(PrepareInMemory(scene, {})) {}
+
+  template <typename Use>
+  auto With(Use use) const {
+    const auto starts = [&](int walks) {
+      return EmissionGuide::StartsIn(*level.world, level.layout, level.texels, walks, kSeed);
+    };
+    return use(PhotonScene{*level.world, *level.lights, std::ssize(level.texels.texels), starts});
+  }
+  int64_t Needed(BakeSettings settings) const {
+    settings.seed = kSeed;
+    const SilentProgress progress;
+    return With([&](const PhotonScene& scene) { return PhotonsFor(scene, settings, progress); });
+  }
+  GatherOutlook LookAheadWith(int64_t photons, uint32_t seed) const {
+    return With([&](const PhotonScene& scene) {
+      const auto stage = BuildPhotonStage(scene, photons, seed);
+      PhotonMap map;
+      map.flux.resize(2 * stage->cells.cells().size());
+      SilentProgress progress;
+      EmitPhotons(scene.world, scene.lights, stage->guide, stage->cells, stage->plan, 0, stage->plan.photons, progress,
+                  map);
+      const RadianceCache cache = EstimateDensity(scene.world, stage->cells, map, stage->plan, {}, progress);
+      const LightTree tree(scene.lights);
+      return LookAhead({scene.world, scene.lights, tree, stage->cells, cache}, scene.starts(512), 0.25f, seed);
+    });
+  }
+};
+
+// A room that gets its light through a slit of the sun, which few photons pass.
+Scene RoomBehindASlit() { return SlitLevel(160, 0.2); }
+
+TEST(PhotonsFor, APlainUnderTheSkyNeedsTheLeastAndARoomBehindASlitMore) {
+  const Prepared plain(PlaneLevel(160)), room(RoomBehindASlit());
+  const int64_t for_plain = plain.Needed({}), for_room = room.Needed({});
+  EXPECT_LE(for_plain, 40000);
+  EXPECT_GE(for_room, 2 * for_plain);
+}
+
+TEST(PhotonsFor, ASmallerErrorNeedsMoreAndANumberOfOnesOwnIsKept) {
+  const Prepared room(RoomBehindASlit());
+  BakeSettings settings;
+  settings.target_error = 0.1f;
+  const int64_t coarse = room.Needed(settings);
+  settings.target_error = 0.02f;
+  EXPECT_GE(room.Needed(settings), 2 * coarse);
+  settings.photons = 4711;
+  EXPECT_EQ(room.Needed(settings), 4711);
+}
+
+TEST(PhotonsFor, IsTheSameForAnyNumberOfThreads) {
+  const Prepared room(RoomBehindASlit());
+  std::vector<int64_t> needed;
+  for (const size_t threads : {size_t{1}, size_t{2}}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    needed.push_back(room.Needed({}));
+  }
+  EXPECT_EQ(needed[0], needed[1]);
+}
+
+// By less than one over their number at first: where cells are large, hits are near and their light is not the photons'.
+TEST(LookAhead, NoiseOfPhotonsFallsWithTheirNumber) {
+  const Prepared room(RoomsLevel(96, 10));
+  double few = 0, many = 0;
+  for (uint32_t seed = 0; seed < 8; ++seed) {
+    few += room.LookAheadWith(8000, seed).photon_variance;
+    many += room.LookAheadWith(128000, seed).photon_variance;
+  }
+  EXPECT_GT(few, 0);
+  EXPECT_GT(few / many, 2);
+  EXPECT_LT(few / many, 16);
+}
+
+TEST(LookAhead, NothingIsNoiseWhereThereIsNoLight) {
+  const Prepared dark(RoomsLevel(64, 0));
+  const GatherOutlook outlook = dark.LookAheadWith(1000, 0);
+  EXPECT_EQ(outlook.photon_variance, 0);
+  EXPECT_EQ(outlook.ray_variance, 0);
+}
+
+}  // namespace
+}  // namespace bakewell
