@@ -29,7 +29,7 @@ struct BakeSettings {
   float target_error = 0;      // relative standard error at which a texel stops; 0: the quality's
   int min_samples = 0;         // gather rays a texel, power of two; 0: the quality's
   int max_samples = 0;         // power of two; 0: the quality's
-  int64_t photons = 0;         // photons emitted; 0: from quality and the number of surface cells
+  int64_t photons = 0;         // photons emitted; 0: as many as the target error needs, up to the quality's most
   int photon_batches = 8;      // tasks the photons are split into; does not change any byte
   float albedo_limit = 0.98f;  // theory.md 1
   uint32_t seed = 0;

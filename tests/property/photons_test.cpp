@@ -76,7 +76,8 @@ TEST(PhotonsFor, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(needed[0], needed[1]);
 }
 
-// By less than one over their number at first: where cells are large, hits are near and their light is not the photons'.
+// By less than one over their number at first: where cells are large, hits are near and their light is not the
+// photons'.
 TEST(LookAhead, NoiseOfPhotonsFallsWithTheirNumber) {
   const Prepared room(RoomsLevel(96, 10));
   double few = 0, many = 0;

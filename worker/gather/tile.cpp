@@ -160,7 +160,7 @@ class TileGatherer {
     for (const Work& work : work_) dark += work.dark && !work.audited ? 1 : 0;
     const int64_t full = lit_ ? audit.RaysOf(dark) : dark * options_.min_samples;
     counters_.skip[lit_ ? Skip::kDarkCharts : Skip::kNoLight].Add(
-        {dark, std::ssize(work_), std::max<int64_t>(0, full - dark * kValidityFirstRays)});
+        {dark, std::ssize(work_), std::max<int64_t>(0, full - dark * kLeastValidityRays)});
   }
 
   // Suns and sky, where no gather ray of the tile escaped and no sample of the first round found them.

@@ -7,7 +7,7 @@
 
 namespace bakewell {
 
-inline constexpr int kValidityFirstRays = 8;  // where nobody knows yet
+inline constexpr int kLeastValidityRays = 4;  // of a texel that nothing divides, where nobody knows yet
 
 // Whether anything but the about flat surface of the texel's own chart rises above its plane within two radii of its
 // centre (or so many triangles are there that it is not worth knowing). Where nothing does, nothing divides the texel
