@@ -397,23 +397,5 @@ TEST_F(FarmTest, WorkerOfAnotherVersionIsRefusedPolitely) {
   EXPECT_NE(status.message().find("test/chain v7"), absl::string_view::npos) << status;
 }
 
-TEST_F(FarmTest, GarbageCollectionKeepsWhatALiveJobNeeds) {
-  Farm farm(FastOptions(dir.path()));
-  auto& worker = farm.AddWorker("w");
-  farm.Bake(scene);
-  SyntheticScene slow = scene;
-  slow.seed = 9;
-  slow.work_us = 50'000;
-  const auto client = farm.Client();
-  const auto job = client->Submit(slow.Text(), {});
-  ASSERT_TRUE(WaitFor([&] { return client->Get(job->job_id())->tasks_done() > 4; }));
-  const auto report = client->CollectGarbage(0, std::chrono::microseconds(1));
-  ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_GT(report->results(), 20);
-  const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
-  EXPECT_EQ(ended->state(), v1::DONE);
-  EXPECT_EQ(worker.worker->counters().failed, 0);
-}
-
 }  // namespace
 }  // namespace bakewell::test
