@@ -300,7 +300,9 @@ TEST_F(FarmTest, DrainedWorkerFinishesAndLeaves) {
 
 // Symptom: a worker that was told to leave just before it began to listen for leases listened for ever.
 TEST_F(FarmTest, WorkerDrainedAtAnyMomentLeaves) {
-  Farm farm(FastOptions(dir.path()));
+  Farm::Options options = FastOptions(dir.path());
+  options.job.sched.heartbeat_timeout = seconds(60);  // who is gone has said so, and the early one is not silent yet
+  Farm farm(options);
   FarmLink link(farm.Connect());
   const auto registered = link.Register({"early", "test", 1, 1 << 20, SyntheticExecutor().Kinds()}, {});
   ASSERT_TRUE(registered.ok()) << registered.status();
