@@ -3,6 +3,7 @@
 #include <absl/strings/str_format.h>
 
 #include <chrono>
+#include <map>
 #include <memory>
 
 #include "client/cli/bake_flags.h"
@@ -27,6 +28,7 @@ struct FarmFlags {
   int64_t job = 0;
   std::string name, client_key, output = "out", user;
   bool wait = false, interactive = false;
+  v1::JobState state = v1::JOB_STATE_UNSPECIFIED;
   int limit = 20;
 };
 
@@ -97,32 +99,39 @@ absl::StatusOr<v1::Job> WatchJob(FarmClient& client, int64_t id, const FarmFlags
   return job;
 }
 
-absl::Status Submit(FarmFlags& flags, const Console& console) {
-  const auto start = std::chrono::steady_clock::now();
-  flags.output = flags.bake.output;
-  BAKEWELL_ASSIGN_OR_RETURN(const Submission submission, Prepare(flags));
-  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
-  // A folder that cannot be written is said now, not after the bake.
-  if (flags.wait) BAKEWELL_RETURN_IF_ERROR(OutputDir::Create(flags.output).status());
+absl::Status SubmitOnly(const FarmFlags& flags, const Submission& submission, FarmClient& client,
+                        const Console& console) {
   BAKEWELL_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
-                            client->Submit(submission.scene_bytes, OptionsOf(flags, submission)));
-  if (!flags.wait) {
-    for (const std::string& warning : submission.level.warnings) console.err << "warning: " << warning << "\n";
-    BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client->Get(submitted.job_id()));
-    PrintJob(job, flags, console);
-    return absl::OkStatus();
-  }
-  BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, WatchJob(*client, submitted.job_id(), flags, console));
+                            client.Submit(submission.scene_bytes, OptionsOf(flags, submission)));
+  for (const std::string& warning : submission.level.warnings) console.err << "warning: " << warning << "\n";
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, client.Get(submitted.job_id()));
+  PrintJob(job, flags, console);
+  return absl::OkStatus();
+}
+
+absl::Status SubmitAndFetch(const FarmFlags& flags, const Submission& submission, FarmClient& client,
+                            const Console& console) {
+  const auto start = std::chrono::steady_clock::now();
+  // A folder that cannot be written is said now, not after the bake.
+  BAKEWELL_ASSIGN_OR_RETURN(OutputDir out, OutputDir::Create(flags.bake.output));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
+                            client.Submit(submission.scene_bytes, OptionsOf(flags, submission)));
+  BAKEWELL_ASSIGN_OR_RETURN(const v1::Job job, WatchJob(client, submitted.job_id(), flags, console));
   PrintJob(job, flags, console);
   BAKEWELL_RETURN_IF_ERROR(StatusOfEnded(job, flags.bake.scene));
-  BAKEWELL_ASSIGN_OR_RETURN(OutputDir out, OutputDir::Create(flags.output));
-  BAKEWELL_ASSIGN_OR_RETURN(const Manifest manifest, FetchResult(*client, job, submission, out));
-  BAKEWELL_ASSIGN_OR_RETURN(BakeSummary summary, Conclude(out, flags.output, manifest));
+  BAKEWELL_ASSIGN_OR_RETURN(const Manifest manifest, FetchResult(client, job, submission, out));
+  BAKEWELL_ASSIGN_OR_RETURN(BakeSummary summary, Conclude(out, flags.bake.output, manifest));
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   summary.cpu_seconds = static_cast<double>(job.run_us()) * 1e-6;
   summary.phases = PhasesOf(job);
   PrintSummary(summary, flags.json ? OutputForm::kJson : OutputForm::kText, console);
   return absl::OkStatus();
+}
+
+absl::Status Submit(FarmFlags& flags, const Console& console) {
+  BAKEWELL_ASSIGN_OR_RETURN(const Submission submission, Prepare(flags));
+  BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
+  return (flags.wait ? SubmitAndFetch : SubmitOnly)(flags, submission, *client, console);
 }
 
 absl::Status Estimate(FarmFlags& flags, const Console& console) {
@@ -154,6 +163,7 @@ absl::Status List(FarmFlags& flags, const Console& console) {
   BAKEWELL_ASSIGN_OR_RETURN(const auto client, OpenClient(flags.connect));
   v1::ListRequest filter;
   filter.set_user(flags.user);
+  filter.set_state(flags.state);
   BAKEWELL_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, client->List(filter, flags.limit));
   for (const v1::Job& job : jobs) PrintJob(job, flags, console);
   return absl::OkStatus();
@@ -261,6 +271,10 @@ void AddFarmCommands(CLI::App& app, const Console& console, int* exit_code) {
   }
   CLI::App* list = add("list", "Jobs, newest first", List);
   list->add_option("--user", flags->user, "of this user only");
+  const std::map<std::string, v1::JobState> states = {
+      {"running", v1::RUNNING}, {"done", v1::DONE}, {"failed", v1::FAILED}, {"cancelled", v1::CANCELLED}};
+  list->add_option("--state", flags->state, "in this state only: running, done, failed or cancelled")
+      ->transform(CLI::Transformer(states));
   list->add_option("--limit", flags->limit, "how many")->capture_default_str();
   AddJson(list, *flags);
   AddJson(add("workers", "Workers that are connected", Workers), *flags);

@@ -28,6 +28,8 @@ struct ServeFlags {
   int64_t quota_bytes = 0;
   store::AccountRow defaults;
   int heartbeat_timeout_s = 15;
+  int collect_every_s = 3600;
+  int64_t keep_bytes = 0;
 };
 
 struct TokenFlags {
@@ -78,6 +80,8 @@ absl::Status Serve(const ServeFlags& flags, const plan::Planner& planner, const 
   options.quota_bytes = flags.quota_bytes;
   options.defaults = flags.defaults;
   options.sched.heartbeat_timeout = std::chrono::seconds(flags.heartbeat_timeout_s);
+  options.collect_every = std::chrono::seconds(flags.collect_every_s);
+  options.keep_bytes = flags.keep_bytes;
   options.log = [](std::string_view line) { spdlog::info("{}", line); };
   BAKEWELL_ASSIGN_OR_RETURN(const auto coordinator, job::Coordinator::Open(options, planner));
   const job::LocalRunner runner(*coordinator, local, /*threads=*/2);
@@ -161,6 +165,13 @@ void AddServeFlags(CLI::App& serve, ServeFlags& flags) {
   serve.add_option("--max-tasks", flags.defaults.max_tasks, "tasks of a job; 0: no limit");
   serve.add_option("--heartbeat-timeout", flags.heartbeat_timeout_s, "seconds until a silent worker's tasks go back")
       ->check(CLI::Range(1, 3600));
+  serve.add_option("--collect-every", flags.collect_every_s, "seconds between collections of garbage; 0: only by hand")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  serve
+      .add_option("--keep", flags.keep_bytes,
+                  "bytes above which a collection forgets results, oldest use first; 0: nine tenths of --quota")
+      ->transform(CLI::AsSizeValue(false));
 }
 
 }  // namespace

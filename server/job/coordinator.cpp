@@ -23,6 +23,7 @@ void FillDefaults(Options& options) {
   if (!options.steady_now) options.steady_now = SteadyNow;
   if (!options.wall_now_us) options.wall_now_us = SystemNowUs;
   if (!options.log) options.log = [](std::string_view) {};
+  if (options.keep_bytes == 0) options.keep_bytes = options.quota_bytes > 0 ? options.quota_bytes / 10 * 9 : INT64_MAX;
 }
 
 constexpr auto kTick = std::chrono::milliseconds(100);
@@ -84,6 +85,11 @@ Coordinator::Coordinator(Options options, const plan::Planner& planner, Parts pa
       // Worker ids carry the epoch as well, so that one from before a restart is never taken for another.
       next_worker_((static_cast<uint64_t>(parts.epoch) << 32) + 1),
       writer_(std::move(parts.writer)),
+      collector_(options_, *writer_, *blobs_,
+                 [this](const TaskKey& key) {
+                   const Lock lock(mutex_);
+                   return by_key_.contains(key);
+                 }),
       io_(options_.io_threads) {}
 
 Coordinator::~Coordinator() {
@@ -108,6 +114,7 @@ void Coordinator::Tick() {
       HandleEvents();
       Dispatch();
     }
+    collector_.Tick(io_);
     NotifyWatchers();
   }
 }

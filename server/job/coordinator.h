@@ -3,8 +3,8 @@
 #include <absl/container/flat_hash_map.h>
 
 #include <memory>
-#include <shared_mutex>
 
+#include "server/job/collector.h"
 #include "server/job/learnt_costs.h"
 #include "server/job/options.h"
 #include "server/job/state.h"
@@ -12,7 +12,6 @@
 #include "server/job/watch_list.h"
 #include "server/sched/scheduler.h"
 #include "server/store/blobs.h"
-#include "server/store/collect.h"
 #include "server/store/io_pool.h"
 
 namespace bakewell::job {
@@ -36,7 +35,6 @@ class Coordinator {
   absl::Status SetPriority(int64_t id, int priority);
   absl::Status SetAccount(const store::AccountRow& account);
   absl::StatusOr<std::vector<store::FailureRow>> Failures(int64_t job, int limit);
-  absl::StatusOr<store::CollectReport> CollectGarbage(int64_t target_bytes, int64_t grace_us);
   // kNotFound, or kDataLoss if the bytes were lost: submit again.
   absl::StatusOr<TaskOutput> FindArtifact(int64_t id, std::string_view name);
   // SerializePreview() blobs of a running job's picture, from the `first` on. kNotFound.
@@ -66,6 +64,7 @@ class Coordinator {
 
   store::BlobStore& blobs() { return *blobs_; }
   store::IoPool& io() { return io_; }
+  Collector& collector() { return collector_; }
   store::Writer& writer() { return *writer_; }
   // Tells the database of a blob that has come; `done` after the commit.
   void RecordBlob(const Digest& digest, int64_t size_bytes, Done done);
@@ -94,6 +93,7 @@ class Coordinator {
   TaskId AddTask(Job& job, const plan::PlannedTask& planned, const std::optional<TaskOutputs>& known);
   void ContinueLater(int64_t id);
   absl::Status ContinueJob(int64_t id);
+  void AddStages(int64_t id, absl::StatusOr<std::vector<Stage>> stages);
   absl::Status Recover();
   absl::Status RecoverJob(const store::JobRow& row);
   JobView ViewOf(const Job& job) const;
@@ -125,7 +125,6 @@ class Coordinator {
   std::unique_ptr<store::BlobStore> blobs_;
   std::mutex reader_mutex_;
   std::unique_ptr<store::Tables> reader_;  // guarded by reader_mutex_
-  std::shared_mutex collecting_;           // held shared from looking up results until a live job names them
 
   mutable std::mutex mutex_;  // guards all that follows
   sched::Scheduler sched_;
@@ -142,6 +141,7 @@ class Coordinator {
 
   WatchList watches_;
   std::unique_ptr<store::Writer> writer_;
+  Collector collector_;
   store::IoPool io_;
   std::condition_variable tick_;
   std::thread ticker_;

@@ -230,14 +230,6 @@ absl::StatusOr<std::vector<store::FailureRow>> Coordinator::Failures(int64_t job
   return reader_->RecentFailures(job, limit);
 }
 
-absl::StatusOr<store::CollectReport> Coordinator::CollectGarbage(int64_t target_bytes, int64_t grace_us) {
-  const std::unique_lock collecting(collecting_);
-  return store::Collect(*writer_, *blobs_, {target_bytes, WallNowUs(), grace_us}, [this](const TaskKey& key) {
-    const Lock lock(mutex_);
-    return by_key_.contains(key);
-  });
-}
-
 void Coordinator::NotifyWatchers() {
   std::set<int64_t> running, changed;
   {

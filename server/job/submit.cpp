@@ -143,7 +143,7 @@ absl::StatusOr<SubmitResult> Coordinator::Submit(const SubmitRequest& request) {
   BAKEWELL_RETURN_IF_ERROR(CheckQuota(request, account));
 
   // From here until the job is active, nothing that is known may be collected.
-  const std::shared_lock collecting(collecting_);
+  const store::CollectGate::Hold hold = collector_.gate().Enter();
   BAKEWELL_ASSIGN_OR_RETURN(std::vector<Stage> stages, PlanKnown({request.scene, request.settings}, {}, {}));
   store::JobRow row;
   row.user = request.user;
@@ -279,14 +279,11 @@ Coordinator::TaskId Coordinator::AddTask(Job& job, const plan::PlannedTask& plan
 void Coordinator::ContinueLater(int64_t id) {
   io_.Post([this, id] {
     const absl::Status status = Caught([&] { return ContinueJob(id); });
-    if (status.ok()) return;
-    const Lock lock(mutex_);
-    EndJob(id, store::JobState::kFailed, status, {});
-    HandleEvents();
-    Dispatch();
+    if (!status.ok()) AddStages(id, status);
   });
 }
 
+// Plans the next stages and asks for them to be written; no thread waits for the disk, which may be full for hours.
 absl::Status Coordinator::ContinueJob(int64_t id) {
   plan::PlanRequest request;
   std::vector<plan::TaskGraph> stages;
@@ -301,26 +298,42 @@ absl::Status Coordinator::ContinueJob(int64_t id) {
     if (!gate_task.done) return absl::OkStatus();  // lost meanwhile; comes again when it is
     gate = gate_task.outputs;
   }
-  const std::shared_lock collecting(collecting_);
+  const store::CollectGate::Hold hold = collector_.gate().Enter();  // until the stages are part of the job
   const size_t first = stages.size();
-  BAKEWELL_ASSIGN_OR_RETURN(std::vector<Stage> planned, PlanKnown(request, std::move(stages), gate));
+  BAKEWELL_ASSIGN_OR_RETURN(std::vector<Stage> known, PlanKnown(request, std::move(stages), gate));
   std::vector<std::string> graphs;
-  for (const Stage& stage : planned) graphs.push_back(plan::SerializeGraph(stage.graph));
-  const auto write = [&](store::Tables& tables) -> absl::Status {
+  for (const Stage& stage : known) graphs.push_back(plan::SerializeGraph(stage.graph));
+  const auto write = [id, first, graphs = std::move(graphs)](store::Tables& tables) -> absl::Status {
     for (size_t i = 0; i < graphs.size(); ++i) {
       BAKEWELL_RETURN_IF_ERROR(tables.InsertStage(id, static_cast<int64_t>(first + i), graphs[i]));
     }
     return absl::OkStatus();
   };
-  BAKEWELL_RETURN_IF_ERROR(writer_->Run(write));
+  const auto planned = std::make_shared<std::vector<Stage>>(std::move(known));
+  writer_->Submit(write, [this, id, planned, hold](const absl::Status& written) {
+    io_.Post([this, id, planned, hold, written] {
+      if (written.ok())
+        AddStages(id, std::move(*planned));
+      else
+        AddStages(id, written);
+    });
+  });
+  return absl::OkStatus();
+}
+
+// Goes on with them, or ends the job if there are none.
+void Coordinator::AddStages(int64_t id, absl::StatusOr<std::vector<Stage>> stages) {
   const Lock lock(mutex_);
   const auto job = jobs_.find(id);
-  if (job == jobs_.end() || job->second.ending) return absl::OkStatus();
-  for (Stage& stage : planned) AddStage(job->second, std::move(stage));
-  if (!job->second.stages.back().next_stage_after) sched_.CloseJob(sched::JobId{id});
+  if (job == jobs_.end() || job->second.ending) return;
+  if (stages.ok()) {
+    for (Stage& stage : *stages) AddStage(job->second, std::move(stage));
+    if (!job->second.stages.back().next_stage_after) sched_.CloseJob(sched::JobId{id});
+  } else {
+    EndJob(id, store::JobState::kFailed, stages.status(), {});
+  }
   HandleEvents();
   Dispatch();
-  return absl::OkStatus();
 }
 
 }  // namespace bakewell::job

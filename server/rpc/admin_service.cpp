@@ -101,7 +101,7 @@ grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerConte
   return OnIo(services_, context, Any(Scope::kAdmin), [=, this](const Caller&) -> absl::Status {
     const int64_t grace_us = request->grace_us() > 0 ? request->grace_us() : kDefaultGraceUs;
     BAKEWELL_ASSIGN_OR_RETURN(const store::CollectReport report,
-                              services_.coordinator.CollectGarbage(request->target_bytes(), grace_us));
+                              services_.coordinator.collector().Collect(request->target_bytes(), grace_us));
     response->set_results(report.results);
     response->set_blobs(report.blobs);
     response->set_bytes(report.bytes);

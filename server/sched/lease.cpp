@@ -161,7 +161,9 @@ Grant Scheduler::GrantLease(WorkerId worker_id, TaskId id, Time now) {
   const LeaseToken token{next_token_++};
   const Time expected = Expected(task);
   const Time limit = std::max(options_.min_run_limit, expected * options_.run_limit_factor);
-  const Time due = now + std::max(options_.min_straggler, expected * options_.straggler_factor);
+  // Of a kind that was never measured here there is a guess only, and machines that others use are slow.
+  const int patience = SpeedRatio(classes_[task.class_index].capability) == 1.0 ? options_.unmeasured_factor : 1;
+  const Time due = now + patience * std::max(options_.min_straggler, expected * options_.straggler_factor);
   leases_[token] = {id, worker_id, now, now + limit, expected, due, task.home};
   run_limits_.insert({now + limit, token});
   task.leases.push_back(token);

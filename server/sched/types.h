@@ -81,7 +81,8 @@ struct Options {
   int run_limit_factor = 20;
   int straggler_factor = 2;  // run twice after this many times the expected time, at a job's end
   Time min_straggler = std::chrono::seconds(2);
-  int max_failures = 3;  // workers that failed the task; however often one of them did, it counts once
+  int unmeasured_factor = 10;  // times both, for a kind of which no run has been measured
+  int max_failures = 3;        // workers that failed the task; however often one of them did, it counts once
   // Where nobody else can take a task, a worker that failed it gets it again after `retry`, doubling up to 64 times; a
   // task that has failed max_tries times on whomever there was fails as well.
   Time retry = std::chrono::seconds(1);

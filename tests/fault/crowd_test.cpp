@@ -10,6 +10,7 @@
 
 #include "tests/support/farm.h"
 #include "tests/support/process.h"
+#include "tests/support/slowness.h"
 #include "tests/support/temp_dir.h"
 
 namespace bakewell::test {
@@ -40,13 +41,6 @@ class Crowd {
   const int port_;
   std::vector<int> files_;
 };
-
-// What the sanitizers cost, more or less.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr int kSlowness = 5;
-#else
-constexpr int kSlowness = 1;
-#endif
 
 TEST(Crowd, TenThousandConnectionsDoNotStopTheService) {
   rlimit limit{};

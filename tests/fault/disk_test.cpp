@@ -86,6 +86,48 @@ TEST(FullDisk, JobWaitsForSpaceAndEndsWithTheSameBytes) {
   EXPECT_TRUE(std::filesystem::is_empty(options.folder / "incoming"));
 }
 
+// Symptom: jobs that went on to their next stage waited for the disk, eight of them on all io threads. Another program
+// that has the database is to the writer what a full disk is.
+TEST(FullDisk, JobsThatGoOnHoldNoThread) {
+  const TempDir dir("/dev/shm");
+  Farm::Options options;
+  options.folder = dir.path();
+  Farm farm(options);
+  job::Coordinator& coordinator = farm.coordinator();
+  const auto client = farm.Client();
+  std::vector<int64_t> jobs;
+  for (int seed = 0; seed < 12; ++seed) {
+    SyntheticScene scene;
+    scene.seed = seed;
+    jobs.push_back(client->Submit(scene.Text(), {}).value().job_id());
+  }
+  std::vector<job::TaskLease> roots;
+  const sched::WorkerId worker =
+      coordinator.AddWorker({"w", "test", 1, 1 << 30, coordinator.CapabilitiesOf(coordinator.kinds())});
+  coordinator.Connect(worker, [&](job::LeaseNews news) {
+    for (const job::TaskLease& lease : news.leases) roots.push_back(lease);
+  });
+  coordinator.AddCredit(worker, 64);
+  ASSERT_EQ(roots.size(), jobs.size());
+  const std::string bytes = SyntheticScene{}.Text();  // any blob will do
+  const TaskOutputs outputs = {{"out", Sha256Of(bytes), std::ssize(bytes)}};
+  ASSERT_TRUE(coordinator.blobs().Put(Sha256Of(bytes), bytes).ok());
+
+  const auto other = store::Tables::Open(dir.path() / "farm.db");
+  ASSERT_TRUE(other.ok() && (*other)->Begin().ok());
+  for (const job::TaskLease& root : std::vector(roots)) {
+    coordinator.Complete({worker, root.token, root.key, outputs, std::chrono::milliseconds(1)},
+                         [](const absl::Status&) {});
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_TRUE(FarmClient(farm.Connect(), std::chrono::seconds(2)).Get(jobs[0]).ok());
+  (*other)->Rollback();
+  for (const int64_t job : jobs) {
+    EXPECT_TRUE(WaitFor([&] { return client->Get(job)->tasks_total() > 1; })) << job;
+  }
+  coordinator.RemoveWorker(worker);
+}
+
 // Symptom: a farm waits for space, so a bake with a farm of its own waited for ever.
 TEST(FullDisk, EmbeddedBakeEndsWithAnError) {
   const SmallDisk disk("300k");

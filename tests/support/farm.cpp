@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "core/base/check.h"
+#include "tests/support/slowness.h"
 
 namespace bakewell::test {
 
@@ -76,7 +77,7 @@ v1::Job Farm::Bake(const SyntheticScene& scene, const std::string& client_key) {
   const auto submitted = client->Submit(scene.Text(), {client_key, "test", "", false});
   if (!submitted.ok()) std::fprintf(stderr, "%s\n", submitted.status().ToString().c_str());
   BAKEWELL_CHECK(submitted.ok());
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  const auto until = std::chrono::steady_clock::now() + kSlowness * std::chrono::seconds(60);
   const auto job =
       client->Watch(submitted->job_id(), [&](const v1::Job&) { return std::chrono::steady_clock::now() < until; });
   if (!job.ok()) std::fprintf(stderr, "%s\n", job.status().ToString().c_str());
@@ -93,7 +94,7 @@ std::string DigestsOf(const v1::Job& job) {
 }
 
 bool WaitFor(const std::function<bool()>& condition, std::chrono::milliseconds limit) {
-  const auto until = std::chrono::steady_clock::now() + limit;
+  const auto until = std::chrono::steady_clock::now() + kSlowness * limit;
   while (!condition()) {
     if (std::chrono::steady_clock::now() > until) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -47,7 +47,7 @@ class Farm {
   RunningWorker& AddWorker(const std::string& name, WorkerOptions options = {});
   void StopWorkers();
 
-  // Submits, waits and returns the ended job; aborts the test if it takes longer than a minute.
+  // Submits, waits and returns the ended job; aborts the test if it takes longer than a minute (slowness.h).
   v1::Job Bake(const SyntheticScene& scene, const std::string& client_key = "");
 
  private:
@@ -62,7 +62,7 @@ class Farm {
 // Name and digest of every artifact, in order: two runs that agree are equal.
 std::string DigestsOf(const v1::Job& job);
 
-// Polls until `condition` holds or the time is over; whether it held.
+// Polls until `condition` holds or the time is over (times kSlowness); whether it held.
 bool WaitFor(const std::function<bool()>& condition, std::chrono::milliseconds limit = std::chrono::seconds(20));
 
 }  // namespace bakewell::test

@@ -242,8 +242,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
     made->photon_flux = MeanPhotonFlux(stage->cells, made->cache);
     return made;
   }));
-  const LightTree tree(*level->lights);
-  const GatherScene scene{*level->world, *level->lights, tree, stage->cells, photons->cache};
+  const GatherScene scene{*level->world, *level->lights, *level->tree, stage->cells, photons->cache};
   GatherOptions options = BudgetOf(work.settings, level->texels->texel_count()).gather;
   options.mean_irradiance = photons->mean_irradiance;
   options.photon_flux = photons->photon_flux;

@@ -64,6 +64,7 @@ absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout
   BAKEWELL_ASSIGN_OR_RETURN(level->world,
                             World::Build(level->scene, settings.backfaces, settings.albedo_limit, settings.no_skip));
   level->lights = std::make_unique<LightSet>(*level->world, level->scene.environment);
+  level->tree = std::make_unique<LightTree>(*level->lights);
   level->texels = std::make_unique<TexelPages>(*level->world, level->layout, settings.footprint);
   if (level->texels->texel_count() == 0) {
     return absl::InvalidArgumentError(

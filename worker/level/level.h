@@ -35,6 +35,7 @@ struct Level {
   AtlasLayout layout;
   std::unique_ptr<World> world;
   std::unique_ptr<LightSet> lights;
+  std::unique_ptr<LightTree> tree;  // over them
   std::unique_ptr<TexelPages> texels;
 };
 // kInvalidArgument: no lightmapped surface covers a texel.

@@ -5,6 +5,9 @@ overhead.py BIN_DIR SCENE [--quality high] [--resolution 256] [--runs 3]. CPU ti
 processes (getrusage of the ended children). The three take turns; the table has medians, and the median of the ratios
 to the bare kernels of the same turn. With --together the three of a turn run at the same time: what else the machine
 does then slows them alike, and their ratio is less of a lottery. Fails where the files differ.
+
+With --instructions every process runs once under cachegrind and the table has the instructions that it executed outside
+of the system: hardly two runs differ by 0.1 %, whatever else the machine does. It takes 50 times as long.
 """
 import argparse
 import concurrent.futures
@@ -22,10 +25,17 @@ PORT = int(os.environ.get("BAKEWELL_BENCH_PORT", "17741"))
 
 
 class Children:
-    """CPU seconds of children that were started here, once they have ended."""
+    """CPU seconds, or 1e9 instructions, of children that were started here, once they have ended."""
 
-    def __init__(self):
+    def __init__(self, args):
+        self.counts = tempfile.TemporaryDirectory() if args.instructions else None
         self.cpu = 0.0
+
+    def start(self, *words, **options):
+        if self.counts:
+            words = ("valgrind", "--tool=cachegrind", "--cache-sim=no",
+                     f"--cachegrind-out-file={self.counts.name}/%p", "--log-file=/dev/null", *words)
+        return subprocess.Popen(words, **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, **options})
 
     def wait(self, child):
         _, status, usage = os.wait4(child.pid, 0)
@@ -34,13 +44,20 @@ class Children:
         self.cpu += usage.ru_utime + usage.ru_stime
 
     def run(self, *words):
-        self.wait(subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        self.wait(self.start(*words))
+
+    def total(self):
+        if not self.counts:
+            return self.cpu
+        files = list(pathlib.Path(self.counts.name).iterdir())
+        assert files, "cachegrind counted nothing"
+        return sum(int(file.read_text().rsplit("summary:", 1)[1]) for file in files) / 1e9
 
 
 def bare(args, folder):
-    children = Children()
+    children = Children(args)
     children.run(args.bin / "bare_bake", args.scene, folder, args.quality, str(args.resolution))
-    return children.cpu
+    return children.total()
 
 
 def flags(args):
@@ -48,25 +65,27 @@ def flags(args):
 
 
 def embedded(args, folder):
-    children = Children()
+    children = Children(args)
     children.run(args.bin / "bakewell", "bake", args.scene, "-o", folder, *flags(args))
-    return children.cpu
+    return children.total()
 
 
 def farm(args, folder):
-    children = Children()
+    children = Children(args)
     address = f"localhost:{PORT}"
     with tempfile.TemporaryDirectory() as data:
-        server = subprocess.Popen([args.bin / "bakewell-server", "--data", data, "serve", "--listen", f"127.0.0.1:{PORT}",
-                                   "--http", ""], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        server = children.start(args.bin / "bakewell-server", "--data", data, "serve", "--listen", f"127.0.0.1:{PORT}",
+                                "--http", "", stdout=subprocess.PIPE)
         assert server.stdout.readline().startswith(b"ready")
-        workers = [subprocess.Popen([args.bin / "bakewell-worker", "--server", address, "--threads", "1"],
-                                    stderr=subprocess.DEVNULL) for _ in range(2)]
+        workers = [children.start(args.bin / "bakewell-worker", "--server", address, "--threads", "1", stderr=subprocess.PIPE)
+                   for _ in range(2)]
         children.run(args.bin / "bakewell", "submit", args.scene, "--server", address, "--wait", "-o", folder, *flags(args))
         for process in workers + [server]:
             process.send_signal(signal.SIGTERM)
             children.wait(process)
-    return children.cpu
+        for worker in workers:
+            print("worker:", worker.stderr.read().decode().strip().rsplit("] ", 1)[-1], file=sys.stderr)
+    return children.total()
 
 
 def main():
@@ -77,7 +96,9 @@ def main():
     parser.add_argument("--resolution", type=int, default=0, help="0: the scene's")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--together", action="store_true")
+    parser.add_argument("--instructions", action="store_true")
     args = parser.parse_args()
+    unit = "1e9 instructions" if args.instructions else "CPU s"
     ways = {"bare kernels": bare, "bake": embedded, "server and 2 workers": farm}
     cpu = {name: [] for name in ways}
     with tempfile.TemporaryDirectory() as folder:
@@ -93,7 +114,7 @@ def main():
                 assert filecmp.cmp(file, other, shallow=False), f"{other} differs"
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True,
                             cwd=pathlib.Path(__file__).parent).stdout.strip()
-    print(f"| {args.scene.stem} {args.quality}, {args.runs} runs, {commit}, {datetime.date.today()} | CPU s, median (min) | to bare |")
+    print(f"| {args.scene.stem} {args.quality}, {args.runs} runs, {commit}, {datetime.date.today()} | {unit}, median (min) | to bare |")
     print("|---|---|---|")
     for name in ways:
         print(f"{name}:", " ".join(f"{seconds:.2f}" for seconds in cpu[name]), file=sys.stderr)

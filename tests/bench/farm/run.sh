@@ -18,7 +18,7 @@ echo "# as fast as it goes, empty database"
 echo "# as fast as it goes, a million finished tasks"
 "$bin/farm_load" "$data/past" --seconds "$seconds" --run-ms 0 --workers 200 --known 1000000
 echo "# CPU time beside the bare kernels"
-python3 "$root/tests/bench/farm/overhead.py" "$bin" "$root/../shared/reference/scenes/office.glb" --quality high --resolution 192 --together
+python3 "$root/tests/bench/farm/overhead.py" "$bin" "$root/../shared/reference/scenes/office.glb" --quality high --resolution 96 --together
 echo "# farms of several sizes"
 "$root/tests/bench/farm/same_bytes.sh" "$bin" "$root/tests/scenes/sample.glb" "1 2 8" --quality medium --resolution 128
 echo "# chaos"

@@ -47,6 +47,7 @@ class StoreTest : public testing::Test {
   TempDir dir;
   std::unique_ptr<Writer> writer;
   std::unique_ptr<BlobStore> blobs;
+  CollectGate gate;
 };
 
 // Symptom: two servers on one folder, on different ports, deleted each other's uploads and leased the same tasks.
@@ -299,7 +300,8 @@ TEST_F(StoreTest, CollectionGivesUpTheOldestAndKeepsWhatIsNeeded) {
   Know(Key("shares"), "cccc", 4);
   const Digest loose = PutBlob("dddd", 1), fresh = PutBlob("eeee", 1000);
   const CollectOptions options{16, 2000, 1500};
-  const auto report = Collect(*writer, *blobs, options, [](const TaskKey& key) { return key == Key("oldest needed"); });
+  const auto report =
+      Collect(*writer, *blobs, gate, options, [](const TaskKey& key) { return key == Key("oldest needed"); });
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_FALSE(blobs->Has(loose));
   EXPECT_TRUE(blobs->Has(fresh));
@@ -307,15 +309,42 @@ TEST_F(StoreTest, CollectionGivesUpTheOldestAndKeepsWhatIsNeeded) {
   EXPECT_EQ(report->bytes, 20 - blobs->total_bytes());
 }
 
+// Symptom: with a target that recent results alone exceed, every result was forgotten and no byte won.
+TEST_F(StoreTest, CollectionForgetsNoResultWhoseBlobsStay) {
+  OpenAll();
+  const TaskOutputs outputs = {{"out", PutBlob("bbbb", 1000), 4}};
+  Know(Key("old"), "aaaa", 100);
+  EXPECT_TRUE(writer->Run([&](Tables& tables) { return tables.InsertKnown(Key("new"), {outputs, 5, 1000}); }).ok());
+  const auto report = Collect(*writer, *blobs, gate, {0, 2000, 1500}, [](const TaskKey&) { return false; });
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->results, 1);
+  EXPECT_TRUE(blobs->Has(Sha256Of("bbbb")));
+}
+
+// A hold that began on one thread may end on another.
+TEST_F(StoreTest, CollectionWaitsForThoseWhoPlan) {
+  OpenAll();
+  const Digest loose = PutBlob("dddd", 1);
+  CollectGate::Hold hold = gate.Enter();
+  std::thread planner([&, hold = std::move(hold)]() mutable {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    EXPECT_TRUE(blobs->Has(loose));
+    hold.reset();
+  });
+  EXPECT_TRUE(Collect(*writer, *blobs, gate, {0, 2000, 1}, [](const TaskKey&) { return false; }).ok());
+  EXPECT_FALSE(blobs->Has(loose));
+  planner.join();
+}
+
 TEST_F(StoreTest, BlobStaysWhileOneOfTwoResultsNamesIt) {
   OpenAll();
   Know(Key("a"), "same", 1);
   Know(Key("b"), "same", 2);
   ASSERT_TRUE(writer->Run([](Tables& tables) { return tables.DeleteKnown(Key("a")); }).ok());
-  ASSERT_TRUE(Collect(*writer, *blobs, {1 << 20, 10'000'000'000, 1}, [](const TaskKey&) { return false; }).ok());
+  ASSERT_TRUE(Collect(*writer, *blobs, gate, {1 << 20, 10'000'000'000, 1}, [](const TaskKey&) { return false; }).ok());
   EXPECT_TRUE(blobs->Has(Sha256Of("same")));
   ASSERT_TRUE(writer->Run([](Tables& tables) { return tables.DeleteKnown(Key("b")); }).ok());
-  ASSERT_TRUE(Collect(*writer, *blobs, {1 << 20, 10'000'000'000, 1}, [](const TaskKey&) { return false; }).ok());
+  ASSERT_TRUE(Collect(*writer, *blobs, gate, {1 << 20, 10'000'000'000, 1}, [](const TaskKey&) { return false; }).ok());
   EXPECT_FALSE(blobs->Has(Sha256Of("same")));
 }
 
