@@ -80,8 +80,7 @@ Pilot FlyPilot(const PhotonScene& scene, const BakeSettings& settings, float flo
                 stage->plan.photons * (part + 1) / kParts, progress, map);
   });
   NoProgress unheard;
-  const RadianceCache cache =
-      EstimateDensity(scene.world, stage->cells, map, stage->plan, DensityOf(settings), unheard);
+  const RadianceCache cache = EstimateDensity(scene.world, stage->cells, map, stage->plan, {}, unheard);
   const LightTree tree(scene.lights);
   return {LookAhead({scene.world, scene.lights, tree, stage->cells, cache}, scene.starts(kPilotPoints), floor_share,
                     settings.seed),

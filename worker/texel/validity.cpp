@@ -12,7 +12,7 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kInsideShare = 0.9f;    // of back faces: the texel is inside as a whole, if nothing divides it
 constexpr float kOutsideShare = 0.25f;  // of back faces: the texel is outside as a whole, if nothing divides it
-constexpr int kWholeFirstRays = 4;      // where nothing divides the texel
+constexpr int kValidityFirstRays = 8;   // of a texel that something may divide
 constexpr int kCrowdRays = 8, kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
 
 // Cosine-weighted rays from one place, and how many of them met a back face first.
@@ -144,7 +144,7 @@ TexelValidity ProbeValidity(const World& world, uint32_t key, const std::optiona
   const TexelPoint center = sampler.At({0.5f, 0.5f});
   result.backface_share = seen ? seen->share
                                : BackShare(world, center.surface, center.frame, set,
-                                           crowded ? kValidityFirstRays : kWholeFirstRays, result.rays);
+                                           crowded ? kValidityFirstRays : kLeastValidityRays, result.rays);
   if (search == PartSearch::kNear) {
     if (result.backface_share == 0) return Saving(kCrowdRays, result);
     const bool outside = seen && result.backface_share <= kOutsideShare && seen->nearest > 2 * sampler.radius();
