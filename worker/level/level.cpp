@@ -41,17 +41,16 @@ Budget BudgetOf(const BakeSettings& settings, int64_t texels) {
   const QualityNumbers numbers = NumbersOf(settings.quality);
   Budget budget;
   budget.gather.min_samples = settings.min_samples > 0 ? settings.min_samples : numbers.min_samples;
-  budget.gather.max_samples = settings.max_samples > 0 ? settings.max_samples : numbers.max_samples;
+  // An error of one's own choice may need more samples and photons than the quality's.
+  const QualityNumbers limits = settings.target_error > 0 ? NumbersOf(Quality::kHigh) : numbers;
+  budget.gather.max_samples = settings.max_samples > 0 ? settings.max_samples : limits.max_samples;
   budget.gather.min_samples = std::min(budget.gather.min_samples, budget.gather.max_samples);
   budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
   budget.gather.seed = settings.seed;
   budget.gather.filter = Filters(settings);
   budget.gather.no_skip = settings.no_skip;
-  const int64_t usual = numbers.photons_per_texel * texels;
-  // An error of one's own choice may need more than the quality's.
-  const int64_t most = settings.target_error > 0 ? NumbersOf(Quality::kHigh).photons_per_texel * texels : usual;
   budget.least_photons = kLeastPhotons;
-  budget.most_photons = std::clamp(most, kLeastPhotons, kMostPhotons);
+  budget.most_photons = std::clamp(limits.photons_per_texel * texels, kLeastPhotons, kMostPhotons);
   if (settings.photons > 0) budget.least_photons = budget.most_photons = settings.photons;
   return budget;
 }

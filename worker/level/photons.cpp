@@ -114,7 +114,9 @@ int64_t PhotonsFor(const PhotonScene& scene, const BakeSettings& settings, const
     if (progress.Cancelled()) return 0;
     if (needed <= static_cast<double>(kTrusted * pilot)) break;
   }
-  return std::clamp(static_cast<int64_t>(std::min(needed, most)), budget.least_photons, budget.most_photons);
+  // What is no number (light beyond what floats hold) is no reason for few.
+  if (!(needed < most)) return budget.most_photons;
+  return std::max(static_cast<int64_t>(needed), budget.least_photons);
 }
 
 }  // namespace bakewell
