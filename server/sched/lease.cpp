@@ -162,7 +162,7 @@ Grant Scheduler::GrantLease(WorkerId worker_id, TaskId id, Time now) {
   const Time expected = Expected(task);
   const Time limit = std::max(options_.min_run_limit, expected * options_.run_limit_factor);
   // Of a kind that was never measured here there is a guess only, and machines that others use are slow.
-  const int patience = SpeedRatio(classes_[task.class_index].capability) == 1.0 ? options_.unmeasured_factor : 1;
+  const int patience = Measured(classes_[task.class_index].capability) ? 1 : options_.unmeasured_factor;
   const Time due = now + patience * std::max(options_.min_straggler, expected * options_.straggler_factor);
   leases_[token] = {id, worker_id, now, now + limit, expected, due, task.home};
   run_limits_.insert({now + limit, token});
@@ -211,7 +211,7 @@ Completion Scheduler::Complete(TaskId id, LeaseToken token, Time now) {
     const int capability = classes_[task.class_index].capability;
     const double ratio = static_cast<double>(took.count()) / static_cast<double>(task.cost.count());
     // The first one is believed: on a machine that others use too, everything takes longer, and is no straggler.
-    const double before = SpeedRatio(capability), share = before == 1.0 ? 1.0 : 0.1;
+    const double before = SpeedRatio(capability), share = Measured(capability) ? 0.1 : 1.0;
     SetSpeedRatio(capability, before + share * (std::min(ratio, 100.0) - before));
     if (jobs_.contains(lease->second.charged_to)) ready_.Charge(lease->second.charged_to, took - lease->second.charged);
     by = lease->second.worker;

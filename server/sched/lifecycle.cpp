@@ -229,13 +229,15 @@ std::vector<TaskId> Scheduler::ForgetJob(JobId id) {
 void Scheduler::CancelJob(JobId job) { ForgetJob(job); }
 
 void Scheduler::SetSpeedRatio(int capability, double ratio) {
-  if (speed_ratio_.size() <= static_cast<size_t>(capability)) speed_ratio_.resize(capability + 1, 1.0);
+  if (speed_ratio_.size() <= static_cast<size_t>(capability)) speed_ratio_.resize(capability + 1, 0.0);
   speed_ratio_[capability] = ratio;
 }
 
-double Scheduler::SpeedRatio(int capability) const {
-  return static_cast<size_t>(capability) < speed_ratio_.size() ? speed_ratio_[capability] : 1.0;
+bool Scheduler::Measured(int capability) const {
+  return static_cast<size_t>(capability) < speed_ratio_.size() && speed_ratio_[capability] > 0;
 }
+
+double Scheduler::SpeedRatio(int capability) const { return Measured(capability) ? speed_ratio_[capability] : 1.0; }
 
 void Scheduler::CheckConsistent() const {
   size_t ready = 0, leased = 0;

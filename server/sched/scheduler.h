@@ -83,12 +83,13 @@ class Scheduler {
   LeaseToken last_token() const { return LeaseToken{next_token_ - 1}; }
   // Measured over estimated run time of a capability, 1 until something was measured.
   double SpeedRatio(int capability) const;
-  // What was measured before this scheduler's life.
+  // What was measured before this scheduler's life; 0: nothing.
   void SetSpeedRatio(int capability, double ratio);
   // Aborts if the state contradicts itself; for tests. O(n).
   void CheckConsistent() const;
 
  private:
+  bool Measured(int capability) const;
   Task& TaskOf(TaskId task) { return tasks_[static_cast<uint32_t>(task)]; }
   const Task& TaskOf(TaskId task) const { return tasks_[static_cast<uint32_t>(task)]; }
   ReadyQueue::Slot SlotOf(const Task& task) const {
@@ -137,7 +138,7 @@ class Scheduler {
   std::set<std::pair<Time, LeaseToken>> run_limits_;
   std::set<std::pair<Time, WorkerId>> silences_;
   std::set<std::pair<Time, TaskId>> stragglers_;  // running once, by when a second run is due
-  std::vector<double> speed_ratio_;               // by capability
+  std::vector<double> speed_ratio_;               // by capability; 0: none yet
   std::vector<Event> events_;
   uint64_t next_token_;
 };

@@ -18,7 +18,7 @@ class SchedulerTest : public testing::Test {
   TaskId Add(JobId job, std::vector<TaskId> needs = {}, uint64_t order = 0) {
     return scheduler.AddTask(job, {0, order, seconds(1), 0, std::move(needs), false});
   }
-  void AddWorkers(double measured_ratio = 1) {
+  void AddWorkers(double measured_ratio = 0) {
     scheduler.SetSpeedRatio(0, measured_ratio);
     for (const WorkerId id : {kAnn, kBob, kCid, kDan}) scheduler.AddWorker(id, {1, INT64_MAX}, now);
   }
@@ -137,7 +137,7 @@ TEST_F(SchedulerTest, LateCompletionOfALostLeaseCounts) {
 }
 
 TEST_F(SchedulerTest, CompletionRevokesTheOtherHolder) {
-  AddWorkers(/*measured_ratio=*/1.1);
+  AddWorkers(/*measured_ratio=*/1);
   scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
   const TaskId task = Add(kJob);
   const Grant first = One(kAnn);
@@ -152,7 +152,7 @@ TEST_F(SchedulerTest, CompletionRevokesTheOtherHolder) {
 }
 
 TEST_F(SchedulerTest, StragglerIsNotDoubledWhileTheJobHasOtherWork) {
-  AddWorkers(/*measured_ratio=*/1.1);
+  AddWorkers(/*measured_ratio=*/1);
   scheduler.AddJob(kJob, {"ann", kBatch, 1, false});
   const TaskId slow = Add(kJob, {}, 0), other = Add(kJob, {}, 1);
   EXPECT_EQ(One(kAnn).task, slow);
