@@ -1,5 +1,7 @@
 #include "server/store/collect.h"
 
+#include <absl/cleanup/cleanup.h>
+
 #include <algorithm>
 
 namespace bakewell::store {
@@ -81,11 +83,12 @@ absl::Status CollectGate::Alone(const std::function<absl::Status()>& step) {
     }
     closed_ = true;
   }
-  const absl::Status status = step();
-  const std::lock_guard lock(mutex_);
-  closed_ = false;
-  changed_.notify_all();
-  return status;
+  const auto open = absl::MakeCleanup([this] {
+    const std::lock_guard lock(mutex_);
+    closed_ = false;
+    changed_.notify_all();
+  });
+  return step();
 }
 
 absl::StatusOr<CollectReport> Collect(Writer& writer, BlobStore& blobs, CollectGate& gate,
