@@ -14,7 +14,7 @@ namespace {
 constexpr int64_t kPilot = 32768, kNextPilot = 8, kMostPilot = 262144;  // photons
 constexpr int64_t kWorthAPilot = 4;                                     // times its photons may be needed
 constexpr int64_t kTrusted = 16;  // times its photons a pilot may ask for; else a larger one is asked
-constexpr int kPilotPoints = 512;
+constexpr size_t kPilotPoints = 512;
 constexpr double kPhotonShare = 0.35;  // of the target error
 constexpr double kSetShare = 0.3;      // of the samples that independent rays would need: sets, filter and guide
 constexpr double kBounceFall = 0.25;   // bounces a gather ray fall with this power of the photons
@@ -51,13 +51,21 @@ int64_t CellsFor(int64_t photons) {
   return std::max<int64_t>(1024, static_cast<int64_t>(4 * root * root));
 }
 
-std::shared_ptr<const PhotonStage> BuildPhotonStage(const PhotonScene& scene, int64_t photons, uint32_t seed) {
+namespace {
+
+std::shared_ptr<const PhotonStage> StageFrom(const PhotonScene& scene, std::span<const TexelPoint> starts,
+                                             int64_t photons, uint32_t seed) {
   auto stage = std::make_shared<PhotonStage>();
-  stage->guide = EmissionGuide::Learn(scene.world, scene.lights,
-                                      scene.starts(EmissionGuide::WalksFor(scene.lights, photons)), seed);
+  stage->guide = EmissionGuide::Learn(scene.world, scene.lights, starts, seed);
   stage->plan = PlanPhotons(scene.lights, stage->guide, photons, seed);
   stage->cells = SurfaceCells::Build(scene.world, CellsFor(photons), stage->guide.seen());
   return stage;
+}
+
+}  // namespace
+
+std::shared_ptr<const PhotonStage> BuildPhotonStage(const PhotonScene& scene, int64_t photons, uint32_t seed) {
+  return StageFrom(scene, scene.starts(EmissionGuide::WalksFor(scene.lights, photons)), photons, seed);
 }
 
 namespace {
@@ -70,7 +78,9 @@ struct Pilot {
 
 Pilot FlyPilot(const PhotonScene& scene, const BakeSettings& settings, float floor_share, int64_t photons,
                const Progress& progress) {
-  const auto stage = BuildPhotonStage(scene, photons, settings.seed);
+  // The pages of a large level are cut once for both.
+  const std::vector<TexelPoint> points = scene.starts(EmissionGuide::WalksFor(scene.lights, photons));
+  const auto stage = StageFrom(scene, points, photons, settings.seed);
   PhotonMap map;
   map.flux.resize(2 * stage->cells.cells().size());
   constexpr int kParts = 8;
@@ -82,8 +92,8 @@ Pilot FlyPilot(const PhotonScene& scene, const BakeSettings& settings, float flo
   NoProgress unheard;
   const RadianceCache cache = EstimateDensity(scene.world, stage->cells, map, stage->plan, {}, unheard);
   const LightTree tree(scene.lights);
-  return {LookAhead({scene.world, scene.lights, tree, stage->cells, cache}, scene.starts(kPilotPoints), floor_share,
-                    settings.seed),
+  return {LookAhead({scene.world, scene.lights, tree, stage->cells, cache},
+                    std::span(points).first(std::min(points.size(), kPilotPoints)), floor_share, settings.seed),
           static_cast<double>(stage->plan.photons)};
 }
 
