@@ -65,11 +65,14 @@ std::string SettingsFor(const KindName& kind, BakeSettings settings) {
     counted.no_skip = settings.no_skip;
     return SettingsJson(counted);
   }
-  if (kind.kind == level_task::kFinish.kind) settings.photons = defaults.photons;
   if (kind.kind == level_task::kGather.kind) return SettingsJson(settings);
-  const bool finishes = kind.kind == level_task::kFinish.kind;
-  settings.filter = finishes ? settings.filter : defaults.filter;
-  if (!finishes && kind.kind != level_task::kSurvey.kind) settings.target_error = defaults.target_error;
+  const bool finishes = kind.kind == level_task::kFinish.kind, surveys = kind.kind == level_task::kSurvey.kind;
+  if (finishes) {
+    settings.photons = defaults.photons;
+  } else {
+    settings.filter = defaults.filter;
+  }
+  if (!finishes && !surveys) settings.target_error = defaults.target_error;
   settings.min_samples = defaults.min_samples;
   settings.max_samples = defaults.max_samples;
   return SettingsJson(settings);

@@ -6,6 +6,8 @@
 
 #include "tests/support/bake_scene.h"
 #include "tests/support/scene_builder.h"
+#include "tests/support/skip_levels.h"
+#include "worker/filter/window.h"
 
 namespace bakewell {
 namespace {
@@ -42,6 +44,22 @@ TEST(IsCrowded, WhereSomethingElseRisesWithinTwoRadii) {
     const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 3 + x)]];
     const TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
     EXPECT_EQ(IsCrowded(*prepared.world, prepared.layout, texel, sampler.radius()), x >= 4 && x <= 6) << x;
+  }
+}
+
+// Rays between neighbours find nothing that it did not say.
+TEST(IsCrowded, TexelsThatAreNotHaveTheConnectionsThatRaysFind) {
+  for (const Scene& scene : {FloorWithBox(5, 6, 0, 8), FloorWithBox(2.3, 4.1, 3.2, 3.3), RoomsLevel(64, 1)}) {
+    const PreparedLevel prepared = PrepareInMemory(scene, {});
+    const TexelMap& map = prepared.texels;
+    int64_t asked = 0, all = 0;
+    for (uint32_t i = 0; i < map.texels.size(); ++i) {
+      const TexelSampler sampler(*prepared.world, prepared.layout, map, map.texels[i]);
+      const bool crowded = IsCrowded(*prepared.world, prepared.layout, map.texels[i], sampler.radius());
+      EXPECT_EQ(ConnectTexel(*prepared.world, map, i, crowded, asked), ConnectTexel(*prepared.world, map, i, true, all))
+          << i;
+    }
+    EXPECT_LT(asked, all);
   }
 }
 
