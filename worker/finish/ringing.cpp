@@ -1,6 +1,7 @@
 #include "worker/finish/ringing.h"
 
-#include <Eigen/Eigenvalues>
+#include <immintrin.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,103 +9,175 @@
 namespace bakewell {
 namespace {
 
-constexpr double kAim = 0.9 * kMostRinging;  // between this and kMostRinging a search ends
+// Eight texels side by side: what one gets does not depend on the others.
+using Lanes = __m256;
+static_assert(sizeof(Lanes) == kRingingLanes * sizeof(float));
+
+Lanes Max(Lanes a, Lanes b) { return _mm256_max_ps(a, b); }
+Lanes Min(Lanes a, Lanes b) { return _mm256_min_ps(a, b); }
+Lanes Sqrt(Lanes a) { return _mm256_sqrt_ps(a); }
+Lanes Abs(Lanes a) { return Max(a, -a); }
+
+constexpr auto kMean = static_cast<float>(1 + kMostRinging);     // with what it may be below zero, over itself
+constexpr auto kSpare = static_cast<float>(0.1 * kMostRinging);  // a search ends this near
+constexpr float kLeastSlope = 1e-6f;  // half of b's components; without it poles would have no residue
 
 double Factor(double strength, int l) { return 1 / (1 + strength * l * l * (l + 1) * (l + 1)); }
 
-// Irradiance of one channel, over its mean, as a polynomial of the normal, 1 + b . n + n^T q n, in the frame of q's
-// axes: windows change the lengths of b and q only.
-class Quadratic {
- public:
+// Irradiance of one channel less its mean, over that: b . n + n^T q n for the normal n.
+struct Quadratic {
+  double b[3] = {}, diagonal[3] = {}, off[3] = {};  // off: yz, xz, xy
+
   Quadratic(const RadianceSh& sh, int channel) {
     const auto term = [&](int i, double basis) {
       return static_cast<double>(sh.lambda[static_cast<size_t>(i)][channel]) *
              static_cast<double>(kCosineLobe[static_cast<size_t>(i)]) * basis;
     };
-    mean_ = term(0, 0.28209479);
-    if (!(mean_ > 0)) return;
-    const double axial = term(6, 0.31539157), across = term(8, 0.54627422);
-    const double xy = 0.5 * term(4, 1.09254843), yz = 0.5 * term(5, 1.09254843), xz = 0.5 * term(7, 1.09254843);
-    q_ << across - axial, xy, xz, xy, -across - axial, yz, xz, yz, 2 * axial;
-    b_ << term(3, 0.48860251), term(1, 0.48860251), term(2, 0.48860251);
-    q_ /= mean_;
-    b_ /= mean_;
-    // q has no trace: its least eigenvalue is not below -sqrt(2/3) of its norm.
-    may_ring_ = 1 - b_.norm() - std::sqrt(2.0 / 3.0) * q_.norm() < -kMostRinging;
-    if (!may_ring_) return;
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
-    axes.computeDirect(q_);
-    eigenvalues_ = axes.eigenvalues();
-    b_ = axes.eigenvectors().transpose() * b_;
+    const double mean = term(0, 0.28209479);
+    if (!(mean > 0)) return;
+    const double over = 1 / mean, axial = over * term(6, 0.31539157), across = over * term(8, 0.54627422);
+    for (int i = 0; i < 3; ++i) {
+      constexpr int kBand1[] = {3, 1, 2}, kBand2[] = {5, 7, 4};
+      b[i] = over * term(kBand1[i], 0.48860251);
+      off[i] = over * term(kBand2[i], 0.5 * 1.09254843);
+    }
+    diagonal[0] = across - axial;
+    diagonal[1] = -across - axial;
+    diagonal[2] = 2 * axial;
   }
 
-  // The least irradiance over all normals, over the mean, with the window of this strength. With a multiplier m for
-  // |n| = 1 the extrema are n_i = -b_i / (2 (q_i - m)); the least has m <= q_min (the trust-region problem).
-  double Least(double strength) const {
-    if (!may_ring_) return 1;
-    const Eigen::Vector3d q = Factor(strength, 2) * eigenvalues_, b = Factor(strength, 1) * b_;
-    double m = q[0] - 0.5 * b.norm();  // here |n| <= 1
-    for (int step = 0; step < 40; ++step) {
-      double square = 0, slope = 0;
-      for (int i = 0; i < 3; ++i) {
-        const double gap = std::max(q[i] - m, 1e-14), n = 0.5 * b[i] / gap;
-        square += n * n;
-        slope += n * n / gap;
-      }
-      if (!(square > 0)) break;
-      // Newton's method on 1/|n| = 1, from below; halfway to the pole where it would jump over that.
-      const double length = std::sqrt(square), next = m + (1 / length - 1) * square * length / slope;
-      const double step_to = next < q[0] ? next : 0.5 * (m + q[0]);
-      if (std::fabs(step_to - m) < 1e-5) break;
-      m = step_to;
+  // Not less than what it can be below zero: q has no trace, so that its least eigenvalue is not below -sqrt(2/3) of
+  // its norm.
+  double Depth() const {
+    double band1 = 0, band2 = 0;
+    for (int i = 0; i < 3; ++i) {
+      band1 += b[i] * b[i];
+      band2 += diagonal[i] * diagonal[i] + 2 * off[i] * off[i];
     }
-    double along = 0;
-    for (int i = 0; i < 3; ++i) along += 0.25 * b[i] * b[i] / std::max(q[i] - m, 1e-14);
-    return 1 + m - along;
+    return std::sqrt(band1) + std::sqrt(2.0 / 3.0 * band2);
+  }
+};
+
+// The same of eight texels, over what each has for a scale, in the frame of q's axes: windows change lengths only.
+struct Channel {
+  Lanes half_b[3], q[3];  // half_b: positive
+
+  // The least b . n + ratio n^T q n over all normals. With a multiplier m for |n| = 1 the extrema are
+  // n_i = -b_i / (2 (q_i - m)); the least has m <= q_min (the trust-region problem), where 1/|n| is concave in m:
+  // Newton's method on 1/|n| = 1 goes one way from where the largest n_i is 1. Any m gives a lower bound.
+  Lanes Least(Lanes ratio) const {
+    const Lanes turned[3] = {ratio * q[0], ratio * q[1], ratio * q[2]};
+    const Lanes low = Min(Min(turned[0], turned[1]), turned[2]);
+    Lanes gap[3], below = {};  // q_i - q_min; q_min - m
+    for (int i = 0; i < 3; ++i) {
+      gap[i] = turned[i] - low;
+      below = Max(below, half_b[i] - gap[i]);
+    }
+    for (int step = 0; step < 4; ++step) {
+      Lanes square{}, slope{};
+      for (int i = 0; i < 3; ++i) {
+        const Lanes over = 1 / (gap[i] + below), n = half_b[i] * over;
+        square += n * n;
+        slope += n * n * over;
+      }
+      below += (Sqrt(square) - 1) * square / slope;
+    }
+    Lanes least = low - below;
+    for (int i = 0; i < 3; ++i) least -= half_b[i] * half_b[i] / (gap[i] + below);
+    return least;
+  }
+};
+
+// One of Jacobi's rotations: makes a_ij zero. k is the third axis.
+void Rotate(Lanes& a_ii, Lanes& a_jj, Lanes& a_ij, Lanes& a_ik, Lanes& a_jk, Lanes& b_i, Lanes& b_j) {
+  const Lanes d = 0.5f * (a_jj - a_ii), size = Abs(d) + Sqrt(d * d + a_ij * a_ij) + 1e-30f;
+  const Lanes t = a_ij / (d < 0 ? -size : size), c = 1 / Sqrt(1 + t * t), s = t * c;
+  a_ii -= t * a_ij;
+  a_jj += t * a_ij;
+  a_ij = Lanes{};
+  const auto turn = [&](Lanes& x, Lanes& y) {
+    const Lanes before = x;
+    x = c * x - s * y;
+    y = s * before + c * y;
+  };
+  turn(a_ik, a_jk);
+  turn(b_i, b_j);
+}
+
+void Diagonalize(Channel& channel, Lanes (&off)[3]) {
+  auto& [b, q] = channel;
+  for (int sweep = 0; sweep < 3; ++sweep) {
+    Rotate(q[0], q[1], off[2], off[1], off[0], b[0], b[1]);
+    Rotate(q[0], q[2], off[1], off[2], off[0], b[0], b[2]);
+    Rotate(q[1], q[2], off[0], off[2], off[1], b[1], b[2]);
+  }
+  for (Lanes& one : b) one = Max(Abs(one), Lanes{} + kLeastSlope);
+}
+
+// Eight texels' irradiance under windows. They make b and q shorter by 1/w and 1/(9 w - 8), where w = 1 + 4 strength;
+// searched is x = w / scale, where the scale is a w that does for certain: between 1 / scale and 1.
+class Batch {
+ public:
+  explicit Batch(std::span<const RadianceSh* const> batch) {
+    Lanes off[3][3] = {};
+    for (size_t lane = 0; lane < batch.size(); ++lane) {
+      const Quadratic channel[3] = {{*batch[lane], 0}, {*batch[lane], 1}, {*batch[lane], 2}};
+      double& scale = scale_[lane];
+      for (const Quadratic& one : channel) scale = std::max(scale, one.Depth() / double{kMean});
+      const double over = std::isfinite(scale) ? 1 / scale : 0;
+      for (int c = 0; c < 3; ++c) {
+        for (int i = 0; i < 3; ++i) {
+          channels_[c].half_b[i][lane] = static_cast<float>(0.5 * over * channel[c].b[i]);
+          channels_[c].q[i][lane] = static_cast<float>(over * channel[c].diagonal[i]);
+          off[c][i][lane] = static_cast<float>(over * channel[c].off[i]);
+        }
+      }
+      least_[lane] = static_cast<float>(std::max(over, 1e-30));
+    }
+    for (int c = 0; c < 3; ++c) Diagonalize(channels_[c], off[c]);
+  }
+
+  Lanes least() const { return least_; }
+  double StrengthAt(size_t lane, float x) const { return (scale_[lane] * static_cast<double>(x) - 1) / 4; }
+
+  // w times what the least irradiance has above -kMostRinging of the mean, over the scale.
+  Lanes Room(Lanes x) const {
+    const Lanes ratio = 1 / (9 - 8 * least_ / x);
+    return kMean * x + Min(Min(channels_[0].Least(ratio), channels_[1].Least(ratio)), channels_[2].Least(ratio));
   }
 
  private:
-  double mean_ = 0;
-  bool may_ring_ = false;
-  Eigen::Matrix3d q_;
-  Eigen::Vector3d b_, eigenvalues_;
+  Channel channels_[3] = {};
+  Lanes least_ = Lanes{} + 1;
+  std::array<double, kRingingLanes> scale_{1, 1, 1, 1, 1, 1, 1, 1};
 };
-
-// A strength at which `room` is just above zero: it is below at 0 and above at infinity.
-template <typename Room>
-double Search(Room room) {
-  double low = 0, f_low = room(0), high = 0.02, f_high = 0;
-  for (; (f_high = room(high)) < 0; high *= 4) {
-    low = high;
-    f_low = f_high;
-  }
-  // By the secant between one that rings and one that does not.
-  for (int step = 0; step < 60 && f_high > kMostRinging - kAim; ++step) {
-    // Aims between the two ends of what is accepted; the midpoint now and then keeps it from creeping.
-    const double aim = 0.5 * (kMostRinging - kAim), part = (aim - f_low) / (f_high - f_low);
-    const double middle = low + (high - low) * (step % 4 == 3 ? 0.5 : std::clamp(part, 0.02, 0.98));
-    const double f = room(middle);
-    (f < 0 ? low : high) = middle;
-    (f < 0 ? f_low : f_high) = f;
-  }
-  return high;
-}
 
 }  // namespace
 
-double WindowStrength(const RadianceSh& sh) {
-  const std::array<Quadratic, 3> channels = {Quadratic(sh, 0), Quadratic(sh, 1), Quadratic(sh, 2)};
-  const std::array<double, 3> least = {channels[0].Least(0), channels[1].Least(0), channels[2].Least(0)};
-  const auto worst = static_cast<size_t>(std::min_element(least.begin(), least.end()) - least.begin());
-  if (least[worst] >= -kMostRinging) return 0;
-  // The window that the worst channel needs does for the others, nearly always.
-  const double strength = Search([&](double s) { return channels[worst].Least(s) + kMostRinging; });
-  const auto all = [&](double s) {
-    double room = 1;
-    for (const Quadratic& channel : channels) room = std::min(room, channel.Least(s) + kMostRinging);
-    return room;
-  };
-  return all(strength) >= 0 ? strength : Search(all);
+std::array<double, kRingingLanes> WindowStrengths(std::span<const RadianceSh* const> batch) {
+  const Batch texels(batch);
+  Lanes low = texels.least(), f_low = texels.Room(low), high = Lanes{} + 1, f_high = texels.Room(high);
+  const auto rings = f_low < 0;
+  // By the secant between one that rings and one that does not.
+  for (int step = 0; step < 60; ++step) {
+    const auto open = rings & (f_high > kSpare * high);
+    if (_mm256_testz_ps((Lanes)open, (Lanes)open)) break;
+    // Aims between the two ends of what is accepted; the midpoint now and then keeps it from creeping.
+    const Lanes part = (0.5f * kSpare * high - f_low) / (f_high - f_low);
+    const Lanes middle =
+        low + (high - low) * (step % 4 == 3 ? Lanes{} + 0.5f : Min(Max(part, Lanes{} + 0.02f), Lanes{} + 0.98f));
+    const Lanes f = texels.Room(middle);
+    const auto below = open & (f < 0), above = open & (f >= 0);
+    low = below ? middle : low;
+    f_low = below ? f : f_low;
+    high = above ? middle : high;
+    f_high = above ? f : f_high;
+  }
+  std::array<double, kRingingLanes> strengths{};
+  for (size_t lane = 0; lane < batch.size(); ++lane) {
+    if (rings[lane]) strengths[lane] = texels.StrengthAt(lane, high[lane]);
+  }
+  return strengths;
 }
 
 RadianceSh Windowed(const RadianceSh& sh, double strength) {

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <span>
+
 #include "core/sh/sh.h"
 
 namespace bakewell {
@@ -8,10 +11,12 @@ namespace bakewell {
 // by up to 16 % of its mean. A window of w_l = 1 / (1 + strength (l (l + 1))^2) takes that away and blurs the rest (the
 // minimum of the squared Laplacian, Sloan 2008, Stupid Spherical Harmonics Tricks).
 
-// The least strength that keeps the irradiance (IrradianceFromSh) of every channel above -kMostRinging of its mean, for
-// all normals; 0 where none is needed.
+// A strength for each of up to kRingingLanes texels, whatever the others are: one that keeps the irradiance
+// (IrradianceFromSh) of every channel above -kMostRinging of its mean for all normals, and the least above
+// -0.9 kMostRinging of it by no more; 0 where none is needed.
 inline constexpr double kMostRinging = 0.01;
-double WindowStrength(const RadianceSh& sh);
+inline constexpr size_t kRingingLanes = 8;
+std::array<double, kRingingLanes> WindowStrengths(std::span<const RadianceSh* const> batch);
 
 RadianceSh Windowed(const RadianceSh& sh, double strength);
 
