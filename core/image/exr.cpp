@@ -28,16 +28,15 @@ constexpr uint64_t kSmallImageBytes = 1 << 20;
 // OpenEXR writes into memory; the file itself is written atomically afterwards.
 class MemoryOut : public Imf::OStream {
  public:
-  MemoryOut() : Imf::OStream("memory") {}
+  explicit MemoryOut(size_t expected_bytes) : Imf::OStream("memory") { bytes_.reserve(expected_bytes); }
   void write(const char bytes[], int count) override {
-    const size_t end = position_ + static_cast<size_t>(count);
-    if (end > bytes_.size()) bytes_.resize(end);
-    std::memcpy(bytes_.data() + position_, bytes, static_cast<size_t>(count));
-    position_ = end;
+    if (position_ > bytes_.size()) bytes_.resize(position_);
+    bytes_.replace(position_, static_cast<size_t>(count), bytes, static_cast<size_t>(count));
+    position_ += static_cast<size_t>(count);
   }
   uint64_t tellp() override { return position_; }
   void seekp(uint64_t position) override { position_ = position; }
-  const std::string& Bytes() const { return bytes_; }
+  std::string bytes() && { return std::move(bytes_); }
 
  private:
   std::string bytes_;
@@ -88,13 +87,15 @@ std::string EncodeExr(const Image& image) {
     float* const first = const_cast<float*>(image.Channel(static_cast<int>(c)).data());
     pixels.insert(image.channels[c], PlanarSlice(first, header.dataWindow()));
   }
-  MemoryOut stream;
+  // Lines that would grow are stored as they are.
+  constexpr size_t kHeadBytes = 4096, kLineBytes = 16;
+  MemoryOut stream(image.data.size() * sizeof(float) + kHeadBytes + kLineBytes * static_cast<size_t>(image.height));
   {
     Imf::OutputFile file(stream, header, kThisThreadOnly);
     file.setFrameBuffer(pixels);
     file.writePixels(image.height);
   }
-  return stream.Bytes();
+  return std::move(stream).bytes();
 }
 
 // Throws where the header claims what we do not read or what the file cannot hold; else an image of that shape.
@@ -135,17 +136,19 @@ Image DecodeExr(const std::string& bytes, const std::string& name) {
 
 }  // namespace
 
-absl::Status WriteExr(const std::filesystem::path& path, const Image& image) {
-  if (const absl::Status status = CheckWritable(image); !status.ok()) {
-    return absl::InvalidArgumentError(absl::StrCat(path.string(), ": ", status.message()));
-  }
-  std::string bytes;
+absl::StatusOr<std::string> ExrBytes(const Image& image) {
+  BAKEWELL_RETURN_IF_ERROR(CheckWritable(image));
   try {
-    bytes = EncodeExr(image);
+    return EncodeExr(image);
   } catch (const std::exception& error) {
-    return absl::UnavailableError(absl::StrCat(path.string(), ": OpenEXR cannot encode it: ", error.what()));
+    return absl::UnavailableError(absl::StrCat("OpenEXR cannot encode it: ", error.what()));
   }
-  return WriteFileAtomically(path, bytes);
+}
+
+absl::Status WriteExr(const std::filesystem::path& path, const Image& image) {
+  const auto bytes = ExrBytes(image);
+  if (bytes.ok()) return WriteFileAtomically(path, *bytes);
+  return absl::Status(bytes.status().code(), absl::StrCat(path.string(), ": ", bytes.status().message()));
 }
 
 absl::StatusOr<Image> ReadExr(const std::filesystem::path& path) {

@@ -49,9 +49,7 @@ class NumberWriter {
   explicit NumberWriter(size_t expected_bytes) { bytes_.reserve(expected_bytes); }
   template <typename T>
   void Put(T value) {
-    const size_t at = bytes_.size();
-    bytes_.resize(at + sizeof(T));
-    std::memcpy(bytes_.data() + at, &value, sizeof(T));
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof(T));
   }
   void PutString(std::string_view text) {
     Put(static_cast<uint32_t>(text.size()));
@@ -111,34 +109,32 @@ void AddTotals(NumberReader& reader, PhotonTotals& into) {
   into.cut_paths += totals.cut_paths;
 }
 
+// Nothing but floats, in the order in which they are declared: their bytes are those of the numbers one by one.
+static_assert(sizeof(Rgb) == 3 * sizeof(float) && sizeof(RadianceSh) == 27 * sizeof(float) &&
+              sizeof(LightPart) == 33 * sizeof(float));
+
 void PutTexel(const TexelLight& light, NumberWriter& writer) {
-  Put(light.irradiance, writer);
-  Put(light.sh.lambda, writer);
-  Put(light.variance, writer);
-  Put(light.indirect.irradiance, writer);
-  Put(light.indirect.sh.lambda, writer);
-  Put(light.indirect.variance, writer);
-  Put(light.backface_share, writer);
+  writer.Put(light.irradiance);
+  writer.Put(light.sh);
+  writer.Put(light.variance);
+  writer.Put(light.indirect);
+  writer.Put(light.backface_share);
   writer.Put(static_cast<uint8_t>(light.valid));
   writer.Put(light.open);
   writer.Put(static_cast<uint32_t>(light.direct_samples));
   writer.Put(static_cast<uint32_t>(light.indirect_samples));
 }
 
-TexelLight GetTexel(NumberReader& reader) {
-  TexelLight light;
-  Get(reader, light.irradiance);
-  Get(reader, light.sh.lambda);
-  Get(reader, light.variance);
-  Get(reader, light.indirect.irradiance);
-  Get(reader, light.indirect.sh.lambda);
-  Get(reader, light.indirect.variance);
-  Get(reader, light.backface_share);
+void GetTexel(NumberReader& reader, TexelLight& light) {
+  light.irradiance = reader.Get<Rgb>();
+  light.sh = reader.Get<RadianceSh>();
+  light.variance = reader.Get<Rgb>();
+  light.indirect = reader.Get<LightPart>();
+  light.backface_share = reader.Get<float>();
   light.valid = reader.Get<uint8_t>() != 0;
   light.open = reader.Get<uint8_t>();
   light.direct_samples = static_cast<int>(reader.Get<uint32_t>());
   light.indirect_samples = static_cast<int>(reader.Get<uint32_t>());
-  return light;
 }
 
 constexpr size_t kTexelBytes = 4 * (2 * (3 + 27 + 3) + 1) + 2 + 8;
@@ -220,41 +216,35 @@ absl::StatusOr<RadianceCache> ParseCache(std::string_view bytes) {
   return cache;
 }
 
-GatheredTiles Joined(std::span<const GatheredTiles> parts) {
-  GatheredTiles all;
+std::string SerializeTiles(std::span<const GatheredTiles> parts) {
+  GatherCounters all;
   size_t texels = 0;
-  for (const GatheredTiles& part : parts) texels += part.lights.size();
-  all.lights.reserve(texels);
-  for (const GatheredTiles& part : parts) {
-    all.lights.insert(all.lights.end(), part.lights.begin(), part.lights.end());
-    all.counters.gather_rays += part.counters.gather_rays;
-    all.counters.shadow_rays += part.counters.shadow_rays;
-    all.counters.bounce_rays += part.counters.bounce_rays;
-    all.counters.validity_rays += part.counters.validity_rays;
-    all.counters.filter_rays += part.counters.filter_rays;
-    all.counters.bad_samples += part.counters.bad_samples;
-    all.counters.skip.Add(part.counters.skip);
+  for (const auto& [lights, counters] : parts) {
+    texels += lights.size();
+    all.gather_rays += counters.gather_rays;
+    all.shadow_rays += counters.shadow_rays;
+    all.bounce_rays += counters.bounce_rays;
+    all.validity_rays += counters.validity_rays;
+    all.filter_rays += counters.filter_rays;
+    all.bad_samples += counters.bad_samples;
+    all.skip.Add(counters.skip);
   }
-  return all;
-}
-
-std::string SerializeTiles(const GatheredTiles& tiles) {
-  NumberWriter writer(kHeadBytes + kTexelBytes * tiles.lights.size());
-  const GatherCounters& counters = tiles.counters;
-  for (const int64_t value : {counters.gather_rays, counters.shadow_rays, counters.bounce_rays, counters.validity_rays,
-                              counters.filter_rays, counters.bad_samples}) {
+  NumberWriter writer(kHeadBytes + kTexelBytes * texels);
+  for (const int64_t value :
+       {all.gather_rays, all.shadow_rays, all.bounce_rays, all.validity_rays, all.filter_rays, all.bad_samples}) {
     Put(value, writer);
   }
-  writer.PutString(Serialize(counters.skip));
-  writer.Put(static_cast<uint64_t>(tiles.lights.size()));
-  for (const TexelLight& light : tiles.lights) PutTexel(light, writer);
+  writer.PutString(Serialize(all.skip));
+  writer.Put(static_cast<uint64_t>(texels));
+  for (const GatheredTiles& part : parts) {
+    for (const TexelLight& light : part.lights) PutTexel(light, writer);
+  }
   return std::move(writer).bytes();
 }
 
-absl::StatusOr<GatheredTiles> ParseTiles(std::string_view bytes) {
+absl::StatusOr<GatherCounters> ParseTiles(std::string_view bytes, std::vector<TexelLight>& lights) {
   NumberReader reader(bytes);
-  GatheredTiles tiles;
-  GatherCounters& counters = tiles.counters;
+  GatherCounters counters;
   for (int64_t* value : {&counters.gather_rays, &counters.shadow_rays, &counters.bounce_rays, &counters.validity_rays,
                          &counters.filter_rays, &counters.bad_samples}) {
     Get(reader, *value);
@@ -262,10 +252,9 @@ absl::StatusOr<GatheredTiles> ParseTiles(std::string_view bytes) {
   BAKEWELL_ASSIGN_OR_RETURN(counters.skip, ParseSkipTally(reader.Take(reader.Get<uint32_t>())));
   const uint64_t count = reader.Get<uint64_t>();
   if (count > reader.remaining() / kTexelBytes) return absl::DataLossError("gathered tiles: impossible count");
-  tiles.lights.reserve(count);
-  for (uint64_t i = 0; i < count; ++i) tiles.lights.push_back(GetTexel(reader));
+  for (uint64_t i = 0; i < count; ++i) GetTexel(reader, lights.emplace_back());
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("gathered tiles"));
-  return tiles;
+  return counters;
 }
 
 }  // namespace bakewell

@@ -26,9 +26,9 @@ struct GatheredTiles {
   std::vector<TexelLight> lights;
   GatherCounters counters;
 };
-// Tiles one after the other.
-GatheredTiles Joined(std::span<const GatheredTiles> parts);
-std::string SerializeTiles(const GatheredTiles& tiles);
-absl::StatusOr<GatheredTiles> ParseTiles(std::string_view bytes);
+// The parts one after the other.
+std::string SerializeTiles(std::span<const GatheredTiles> parts);
+// Appends the texels to `lights`.
+absl::StatusOr<GatherCounters> ParseTiles(std::string_view bytes, std::vector<TexelLight>& lights);
 
 }  // namespace bakewell

@@ -260,7 +260,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
   });
   if (work.stop.stop_requested()) return absl::CancelledError("stopped");
   MadeOutputs outputs = Previews(*texels, begin - first, made);
-  outputs.push_back({"lights", SerializeTiles(Joined(made))});
+  outputs.push_back({"lights", SerializeTiles(made)});
   return outputs;
 }
 
@@ -274,16 +274,16 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
     return absl::InvalidArgumentError("the page begins with another tile");
   }
   const auto texels = level->texels->Page(page);
-  std::vector<TexelLight> lights(texels->texels.size());
+  std::vector<TexelLight> lights;
+  lights.reserve(texels->texels.size());
   BakeTally tally;
-  size_t next = 0;
   for (const Blob& blob : InputsNamed(work.inputs, "lights")) {
-    BAKEWELL_ASSIGN_OR_RETURN(const GatheredTiles tiles, ParseTiles(*blob));
-    if (tiles.lights.size() > lights.size() - next) return absl::InvalidArgumentError("more texels than the page has");
-    std::copy(tiles.lights.begin(), tiles.lights.end(), lights.begin() + static_cast<ptrdiff_t>(next));
-    next += tiles.lights.size();
-    tally.Count(tiles.counters);
+    BAKEWELL_ASSIGN_OR_RETURN(const GatherCounters counters, ParseTiles(*blob, lights));
+    if (lights.size() > texels->texels.size()) return absl::InvalidArgumentError("more texels than the page has");
+    tally.Count(counters);
   }
+  const size_t gathered = lights.size();
+  lights.resize(texels->texels.size());
   FilterCounters filtered;
   if (Filters(work.settings)) InArena([&] { FilterPage(*texels, page, lights, filtered); });
   if (!work.settings.no_skip.Has(Skip::kShBands)) {
@@ -292,7 +292,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
     DropBands(*texels, page, asked.target_error, lights, dropped);
     tally.Count(Skip::kShBands, dropped);
   }
-  tally.Count(std::span(lights).first(next), filtered);
+  tally.Count(std::span(lights).first(gathered), filtered);
   BAKEWELL_ASSIGN_OR_RETURN(MadeOutputs outputs, PageFiles(*texels, lights, page));
   outputs.push_back({"tally", tally.Serialize()});
   Say("finish", ++pages_done_, pages);

@@ -9,7 +9,7 @@ namespace bakewell {
 
 // The files of one page, as bytes: lightmap-P.irradiance.exr, .sh.exr, .variance.exr, lightmap-P.png and
 // lightmap-P.charts.json. `lights` holds one element per TexelMap::texels; those of other pages are not looked at.
-// kUnavailable: no room for temporary files.
+// kUnavailable: an encoder refuses.
 absl::StatusOr<MadeOutputs> PageFiles(const TexelMap& map, std::span<const TexelLight> lights, int page);
 
 }  // namespace bakewell
