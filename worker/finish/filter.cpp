@@ -3,6 +3,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
 #include <map>
 
 #include "worker/filter/window.h"
@@ -67,21 +70,29 @@ class PageFilter {
     }
   }
 
+  // A part's numbers side by side, of which the last three are its variance.
+  static constexpr size_t kNumbers = 33, kVariance = 30, kWide = 32;
+  using Numbers = std::array<float, kNumbers>;
+  static_assert(sizeof(LightPart) == sizeof(Numbers) && offsetof(LightPart, variance) == kVariance * sizeof(float));
+
   bool Smooth(const Texel& texel, LightPart& result) const {
     if (!grid_.At(texel.x, texel.y).known) return false;
     const SmoothGrid::Window window = grid_.WindowOf(texel.x, texel.y, grid_.Agree(texel.x, texel.y));
     const int radius = window.radius;
     if (radius == 0) return false;
+    Numbers sum{};
+    std::array<float, 3> variance{};
     for (int dy = -radius; dy <= radius; ++dy) {
       for (int dx = -radius; dx <= radius; ++dx) {
         const float weight = window.At(dx, dy);
         if (weight == 0) continue;
-        const LightPart& light = LightAt(texel.x + dx, texel.y + dy)->indirect;
-        result.irradiance += light.irradiance * weight;
-        for (size_t c = 0; c < kShCoefficients; ++c) result.sh.lambda[c] += light.sh.lambda[c] * weight;
-        result.variance += light.variance * (weight * weight);
+        const float* const light = &LightAt(texel.x + dx, texel.y + dy)->indirect.irradiance.x;
+        for (size_t k = 0; k < kWide; ++k) sum[k] += light[k] * weight;  // four registers; the end is put right below
+        for (size_t k = 0; k < 3; ++k) variance[k] += light[kVariance + k] * (weight * weight);
       }
     }
+    std::copy(variance.begin(), variance.end(), sum.begin() + kVariance);
+    result = std::bit_cast<LightPart>(sum);
     return std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) >= 0;
   }
 
