@@ -36,11 +36,25 @@ absl::Status WriteScene(const Submission& submission, const AtlasLayout& layout,
   return WriteLevel(submission.scene_path, submission.level, layout, pages, folder / "scene.glb");
 }
 
-absl::StatusOr<std::vector<ManifestFile>> DescribeFiles(const fs::path& folder, size_t pages) {
+// A file that was fetched, and therefore is what its digest says.
+absl::StatusOr<ManifestFile> DescribeFetched(const v1::Job& job, const fs::path& folder, const std::string& name,
+                                             const char* kind) {
+  for (const v1::Artifact& artifact : job.artifacts()) {
+    if (artifact.name() != name) continue;
+    BAKEWELL_ASSIGN_OR_RETURN(const Digest digest, DigestFromBytes(artifact.digest()));
+    std::error_code error;
+    const uint64_t size_bytes = fs::file_size(folder / name, error);
+    if (error) return FileError("look at", folder / name, error.value());
+    return ManifestFile{name, kind, size_bytes, digest};
+  }
+  return absl::DataLossError(absl::StrCat("the job made no ", name));
+}
+
+absl::StatusOr<std::vector<ManifestFile>> DescribeFiles(const v1::Job& job, const fs::path& folder, size_t pages) {
   std::vector<ManifestFile> files;
   for (size_t page = 0; page < pages; ++page) {
     for (const level_task::PageFile& one : level_task::kPageFiles) {
-      BAKEWELL_ASSIGN_OR_RETURN(ManifestFile file, DescribeFile(folder / (PageStem(page) + one.ending), one.kind));
+      BAKEWELL_ASSIGN_OR_RETURN(ManifestFile file, DescribeFetched(job, folder, PageStem(page) + one.ending, one.kind));
       files.push_back(std::move(file));
     }
   }
@@ -104,7 +118,7 @@ absl::StatusOr<Manifest> FetchResult(FarmClient& client, const v1::Job& job, con
   manifest.rays = report.rays;
   manifest.photons = report.photons;
   manifest.estimated_error = report.estimated_error;
-  BAKEWELL_ASSIGN_OR_RETURN(manifest.files, DescribeFiles(folder, layout.pages.size()));
+  BAKEWELL_ASSIGN_OR_RETURN(manifest.files, DescribeFiles(job, folder, layout.pages.size()));
   return manifest;
 }
 

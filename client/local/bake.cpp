@@ -82,6 +82,7 @@ absl::StatusOr<Manifest> BakeEmbedded(const Submission& submission, int threads,
   BAKEWELL_RETURN_IF_ERROR(job.status());
   BAKEWELL_RETURN_IF_ERROR(StatusOfEnded(*job, submission.scene_path));
   phases.Enter("write");
+  farm->HandOver(*job, out.Staging());
   return FetchResult(farm->client(), *job, submission, out);
 }
 

@@ -80,6 +80,13 @@ EmbeddedFarm::~EmbeddedFarm() {
   coordinator_.reset();
 }
 
+void EmbeddedFarm::HandOver(const v1::Job& job, const std::filesystem::path& folder) const {
+  for (const v1::Artifact& artifact : job.artifacts()) {
+    const auto digest = DigestFromBytes(artifact.digest());
+    if (digest.ok()) coordinator_->blobs().Link(*digest, folder / artifact.name()).IgnoreError();
+  }
+}
+
 absl::Status EmbeddedFarm::Trouble() {
   BAKEWELL_RETURN_IF_ERROR(coordinator_->writer().Trouble());
   const std::lock_guard lock(mutex_);

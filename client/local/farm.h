@@ -27,6 +27,9 @@ class EmbeddedFarm {
   ~EmbeddedFarm();
 
   FarmClient& client() { return *client_; }
+  // Puts what the job made into the folder, where FarmClient::FetchAll finds it and need not move the bytes; what
+  // cannot be linked there it fetches.
+  void HandOver(const v1::Job& job, const std::filesystem::path& folder) const;
   // Why nothing goes on (the disk is full), although a farm would wait for it to pass.
   absl::Status Trouble();
 

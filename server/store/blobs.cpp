@@ -78,7 +78,7 @@ absl::StatusOr<std::unique_ptr<BlobStore::Upload>> BlobStore::StartUpload(const 
   BAKEWELL_RETURN_IF_ERROR(CheckQuota(size_bytes));
   std::unique_ptr<Upload> upload(new Upload(*this, digest, size_bytes));
   upload->path_ = root_ / "incoming" / absl::StrCat(next_name_.fetch_add(1));
-  upload->file_ = open(upload->path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  upload->file_ = open(upload->path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (upload->file_ < 0) return FromErrno(errno, "creating a file in incoming");
   return upload;
 }
@@ -193,6 +193,11 @@ absl::StatusOr<std::string> BlobStore::Get(const Digest& digest) {
   }
   BAKEWELL_RETURN_IF_ERROR(download->Verify());
   return all;
+}
+
+absl::Status BlobStore::Link(const Digest& digest, const fs::path& path) const {
+  if (link(PathOf(digest).c_str(), path.c_str()) == 0) return absl::OkStatus();
+  return FromErrno(errno, absl::StrCat("linking blob ", digest.Hex()));
 }
 
 void BlobStore::Learn(const Digest& digest, int64_t size_bytes) {

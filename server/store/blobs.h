@@ -91,6 +91,10 @@ class BlobStore {
   // The whole blob, verified. kDataLoss: it was corrupt, and is now quarantined.
   absl::StatusOr<std::string> Get(const Digest& digest);
 
+  // Gives the blob's file a second name, which outlives the store's own; as it is on disk, unverified. Nobody writes to
+  // it: it is the same file. kNotFound; kUnavailable: the file system does not do that (another one, perhaps).
+  absl::Status Link(const Digest& digest, const std::filesystem::path& path) const;
+
   // Tells the store what is there, at start-up, from the database.
   void Learn(const Digest& digest, int64_t size_bytes);
   bool Has(const Digest& digest) const;

@@ -239,6 +239,18 @@ TEST_F(StoreTest, BlobComesBackAndWrongBytesAreRefused) {
   EXPECT_TRUE(fs::is_empty(dir.path() / "incoming"));
 }
 
+TEST_F(StoreTest, LinkedBlobOutlivesItsOwn) {
+  OpenAll();
+  const fs::path path = dir.path() / "linked";
+  EXPECT_EQ(blobs->Link(Sha256Of("hello"), path).code(), absl::StatusCode::kNotFound);
+  const Digest digest = PutBlob("hello");
+  ASSERT_TRUE(blobs->Link(digest, path).ok());
+  ASSERT_TRUE(blobs->Remove(digest).ok());
+  std::string bytes;
+  std::ifstream(path) >> bytes;
+  EXPECT_EQ(bytes, "hello");
+}
+
 TEST_F(StoreTest, MoreBytesThanDeclaredAreRefused) {
   OpenAll();
   const auto upload = blobs->StartUpload(Sha256Of("abc"), 2);
