@@ -53,10 +53,14 @@ TEST(PhotonMap, FluxIsConserved) {
     EXPECT_EQ(map.totals.escaped[c], 0);  // the room is closed
     const double flux = static_cast<double>(map.totals.emitted[c]) / plan.fixed_point_scale;
     EXPECT_NEAR(flux / (kPi * 52), 1, 1e-6);  // 52 m^2 of radiance 1
-    int64_t direct = 0;
-    for (const CellFlux& cell : map.flux) direct += cell.direct[c];
-    EXPECT_EQ(direct, map.totals.emitted[c]);  // every photon's first hit is deposited
+    int64_t deposited = 0;
+    for (const CellFlux& cell : map.flux) deposited += cell.flux[c];
+    EXPECT_NEAR(static_cast<double>(deposited) / static_cast<double>(map.totals.emitted[c]), 1 / (1 - 0.7), 0.03);
   }
+  int64_t photons = 0;
+  for (const CellFlux& cell : map.flux) photons += cell.count;
+  EXPECT_EQ(photons, map.totals.deposits);  // every hit is deposited
+  EXPECT_EQ(map.totals.deposits, map.totals.rays);
 }
 
 TEST(SurfaceCells, AreasAddUpToTheScenes) {

@@ -32,8 +32,7 @@ double CacheMean(int photons_per_cell, uint32_t seed) {
   double sum = 0, area = 0;
   for (size_t i = 0; i < cells.cells().size(); ++i) {
     const auto a = static_cast<double>(cells.cells()[i].area);
-    const CellIrradiance& light = cache.irradiance[2 * i];
-    sum += a * static_cast<double>(light.direct.y + light.indirect.y);
+    sum += a * static_cast<double>(cache.light[2 * i].irradiance.y);
     area += a;
   }
   return sum / (kPi * area);

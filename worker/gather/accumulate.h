@@ -27,7 +27,8 @@ class Accumulator {
     planned_ = planned;
     const size_t block =
         planned <= static_cast<uint32_t>(kBlocks) ? index : static_cast<size_t>(index) * kBlocks / planned;
-    if (++run_ > kRun || block != run_block_) EndRun(block);
+    if (++run_ > kRun) EndRun();
+    if (block != run_block_) EndBlock(block);
     run_irradiance_ += irradiance;
   }
   void AddSh(Vec3f dir_ws, Rgb radiance_over_pdf) {
@@ -37,7 +38,8 @@ class Accumulator {
 
   // Before a round that doubles the samples.
   void Double() {
-    EndRun(0);
+    EndRun();
+    EndBlock(0);
     if (planned_ < static_cast<uint32_t>(kBlocks)) return;
     for (size_t b = 0; b < kBlocks / 2; ++b) block_[b] = block_[2 * b] + block_[2 * b + 1];
     for (size_t b = kBlocks / 2; b < kBlocks; ++b) block_[b] = {};
@@ -84,13 +86,16 @@ class Accumulator {
   }
 
  private:
-  void EndRun(size_t next_block) {
+  void EndBlock(size_t next_block) {
     block_[run_block_] += ToDouble(run_irradiance_);
-    for (size_t i = 0; i < kShCoefficients; ++i) sh_[i] += ToDouble(run_sh_[i]);
     run_irradiance_ = {};
+    run_block_ = next_block;
+  }
+  void EndRun() {
+    EndBlock(run_block_);
+    for (size_t i = 0; i < kShCoefficients; ++i) sh_[i] += ToDouble(run_sh_[i]);
     run_sh_ = {};
     run_ = 1;
-    run_block_ = next_block;
   }
   Vec3d Block(size_t b) const { return b == run_block_ ? block_[b] + ToDouble(run_irradiance_) : block_[b]; }
   Vec3d Mean() const {

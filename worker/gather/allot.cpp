@@ -53,6 +53,18 @@ std::vector<bool> Allot(std::span<const Claim> claims, size_t texels) {
   return granted;
 }
 
+bool IsMet(std::span<const Claim> claims, size_t texels) {
+  double sum = 0;
+  bool any = false;
+  for (const Claim& claim : claims) {
+    const bool may_go_on = claim.doublings > 0 && claim.error > 0;
+    if (may_go_on && claim.error > kWorst * kWorst) return false;
+    any = any || may_go_on;
+    sum += static_cast<double>(claim.doublings > 0 ? claim.error : std::min(claim.error, 1.0f));
+  }
+  return !any || sum <= static_cast<double>(texels);
+}
+
 std::vector<float> TilePool::Mean(std::span<const float> values) const {
   std::vector<float> means(values.size(), 0);
   for (size_t i = 0; i < values.size(); ++i) {

@@ -22,6 +22,8 @@ struct Claim {
 // rounds ahead: what a penumbra still owes after this round is no reason for the plain to double in it.
 inline constexpr float kWorst = 2;  // standard errors over what is tolerated
 std::vector<bool> Allot(std::span<const Claim> claims, size_t texels);
+// Whether Allot grants nothing.
+bool IsMet(std::span<const Claim> claims, size_t texels);
 
 // What texels of a tile say together. Vectors have one element a texel, from texel `begin` on.
 class TilePool {

@@ -54,7 +54,9 @@ class FoundLight {
     bool at_infinity;
     float luminance;
   };
-  std::vector<Ray> rays_, kept_;
+  std::vector<Ray> rays_;
+  // Of those that are kept, one after the other: directions from p are (x, y, z) - near p.
+  std::vector<float> x_, y_, z_, near_;
   double mean_share_ = 0;  // square of the rays' mean luminance, over their mean square
 };
 

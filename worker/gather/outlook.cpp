@@ -49,9 +49,7 @@ Found Gather(const GatherScene& scene, const TexelPoint& point, uint32_t key, Ga
 }
 
 double IrradianceAt(const GatherScene& scene, const SurfacePoint& point) {
-  const CellIrradiance& light =
-      scene.cache.irradiance[2 * static_cast<size_t>(scene.cells.CellAt(point.triangle, point.position))];
-  return static_cast<double>(Luminance(light.direct + light.indirect));
+  return static_cast<double>(Luminance(CacheAt(scene, point, false).irradiance));
 }
 
 }  // namespace

@@ -60,16 +60,16 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
     throughput = throughput * scene.world.AlbedoAt(hit) * kInvPiF;
     if (MaxComponent(throughput) <= 0) return result;
     const SurfacePoint point = scene.world.PointAt(hit);
-    const size_t cell = 2 * static_cast<size_t>(scene.cells.CellAt(hit.triangle, point.position)) + (hit.back ? 1 : 0);
-    const uint8_t window = scene.cache.window[cell];
+    const CachedLight& cached = CacheAt(scene, point, hit.back);
     const uint32_t step_key = HashCombine(key, static_cast<uint32_t>(bounce));
     const float side = scene.cells.patches()[scene.cells.PatchOf(hit.triangle)].cell_side_m;
-    const bool near = bounce == 0 && hit.t < kNearWidths * side * static_cast<float>(window);
-    const bool read = (window != 0 && !near) || bounce == kMaxExtraBounces;
+    const bool near = bounce == 0 && hit.t < kNearWidths * side * static_cast<float>(cached.window);
+    const bool read = (cached.window != 0 && !near) || bounce == kMaxExtraBounces;
     if (read) {
-      result.radiance += throughput * (scene.cache.irradiance[cell].direct + scene.cache.irradiance[cell].indirect);
-      const float weight = Luminance(throughput);
-      for (size_t g = 0; g < kVarianceGroups; ++g) result.group[g] = weight * scene.cache.group[cell][g];
+      const Rgb reflected = throughput * cached.irradiance;
+      result.radiance += reflected;
+      const float unit = Luminance(reflected) / CachedLight::kShareUnit;
+      for (size_t g = 0; g < kVarianceGroups; ++g) result.group[g] = unit * static_cast<float>(cached.group_share[g]);
       return result;
     }
     result.radiance += throughput * SampleDirect(scene, point, step_key, counters);

@@ -16,6 +16,12 @@ struct GatherScene {
   const RadianceCache& cache;
 };
 
+// What the cache knows at a point of the scene's surface.
+inline const CachedLight& CacheAt(const GatherScene& scene, const SurfacePoint& point, bool back) {
+  return scene.cache
+      .light[2 * static_cast<size_t>(scene.cells.CellAt(point.triangle, point.position)) + (back ? 1 : 0)];
+}
+
 struct GatherCounters {
   int64_t gather_rays = 0, shadow_rays = 0, bounce_rays = 0, validity_rays = 0, filter_rays = 0, bad_samples = 0;
   int64_t distant_found = 0;  // samples of suns and sky that arrived; reported to nobody

@@ -24,16 +24,13 @@ double NeededArea(float least, float photon_flux) {
 PhotonDarkness::PhotonDarkness(const SurfaceCells& cells, const RadianceCache& cache, float least, float photon_flux)
     : cells_(cells), cache_(cache), needed_area_(NeededArea(least, photon_flux)) {}
 
-bool PhotonDarkness::IsDark(size_t cell) const {
-  const CellIrradiance& light = cache_.irradiance[2 * cell];
-  return MaxComponent(light.direct) <= 0 && MaxComponent(light.indirect) <= 0;
-}
+bool PhotonDarkness::IsDark(size_t cell) const { return MaxComponent(cache_.light[2 * cell].irradiance) <= 0; }
 
 bool PhotonDarkness::CoversPlace(const SurfacePoint& point) const {
   const size_t cell = cells_.CellAt(point.triangle, point.position);
   const CellPatch& patch = cells_.patches()[cells_.PatchOf(point.triangle)];
   // A cell that others cut says nothing; one with a narrow window is evidence only where all around it is dark.
-  const uint8_t window = cache_.window[2 * cell];
+  const uint8_t window = cache_.light[2 * cell].window;
   if (window == 0 || !IsDark(cell)) return false;
   const int x = static_cast<int>(cell - patch.first_cell) % patch.width;
   const int y = static_cast<int>(cell - patch.first_cell) / patch.width;
@@ -58,10 +55,8 @@ bool PhotonDarkness::Covers(const TexelSampler& sampler) const {
 
 float MeanPhotonFlux(const SurfaceCells& cells, const RadianceCache& cache) {
   double flux = 0;
-  for (size_t i = 0; i < cache.irradiance.size(); ++i) {
-    const CellIrradiance& light = cache.irradiance[i];
-    flux +=
-        static_cast<double>(Luminance(light.direct + light.indirect)) * static_cast<double>(cells.cells()[i / 2].area);
+  for (size_t i = 0; i < cache.light.size(); ++i) {
+    flux += static_cast<double>(Luminance(cache.light[i].irradiance)) * static_cast<double>(cells.cells()[i / 2].area);
   }
   return cache.photons_seen > 0 ? static_cast<float>(flux / static_cast<double>(cache.photons_seen)) : 0;
 }
@@ -72,7 +67,7 @@ float DimmestIrradiance(const SurfaceCells& cells, const RadianceCache& cache, c
   for (uint32_t i = begin; i < end; ++i) {
     const uint32_t triangle = map.fragments[map.texels[i].fragment_begin].triangle;
     const size_t cell = cells.CellAt(triangle, map.texels[i].position);
-    dimmest = std::min(dimmest, Luminance(cache.irradiance[2 * cell].direct + cache.irradiance[2 * cell].indirect));
+    dimmest = std::min(dimmest, Luminance(cache.light[2 * cell].irradiance));
   }
   return dimmest;
 }

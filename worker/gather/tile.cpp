@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "worker/filter/smooth_tile.h"
 #include "worker/gather/allot.h"
@@ -24,6 +25,7 @@ constexpr float kGatherCost = 2.5f;   // of a gather ray and what it meets, over
 constexpr float kBoundless = 1e30f;   // error of what tolerates none
 constexpr float kMargin = static_cast<float>(SetNoise::kMargin);  // what is reported is safe, what stops is likely
 constexpr uint32_t kGuidedFrom = 16;                              // samples; for fewer a guide costs more than it gains
+constexpr float kChangedShare = 0.25f;                            // of a tile's texels; fewer leave the rest as it is
 constexpr size_t kTellingSets = 32;                               // fewer sets of a tile say little about all
 constexpr int64_t kWorthLeavingOut = 64;                          // texels; fewer cost less than the audit
 
@@ -198,6 +200,7 @@ class TileGatherer {
       if (work.direct_active) DirectRound(work, direct, 2 * direct);
       if (work.indirect_active && !work.guided && indirect >= kGuidedFrom) Guide(work);
       if (work.indirect_active) IndirectRound(work, indirect, 2 * indirect);
+      changed_ += work.indirect_active ? 1 : 0;
       any = any || work.direct_active || work.indirect_active;
     }
     return any;
@@ -244,43 +247,69 @@ class TileGatherer {
     if (work.has_indirect) IndirectRound(work, 0, FirstSamples(work));
   }
 
+  // A ray over the hemisphere of a texel, traced.
+  struct GatherRay {
+    uint32_t sample, key;
+    SurfacePoint from;
+    Vec3f dir;
+    float cosine, density;  // density: of the guide
+    Hit hit;
+  };
+
+  // Rays are traced some ahead of what is done with their hits, which are seldom in the processor's caches.
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
+    constexpr uint32_t kAhead = 8;
     const SobolSet set(HashCombine(work.key, 0x6a7e2u));
-    for (uint32_t i = begin; i < end; ++i) {
-      const SobolPoint u = set.At(i);
-      const TexelPoint point = work.sampler.At(u.Get2(2));
-      if (!point.valid) continue;
-      work.indirect.Count();
-      const GatherGuide::Sample drawn = work.guide ? work.guide->Draw(u.Get2(0)) : GatherGuide::Sample{u.Get2(0), 1};
-      const Vec3f local = GatherHemisphere(drawn.primary);
-      const Vec3f dir = point.frame.ToWorld(local);
-      const float pdf = GatherPdf(local.z);
-      const uint32_t ray_key = HashCombine(work.key, 0x80000000u | i);
-      ++counters_.gather_rays;
-      const Hit hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, ray_key));
-      if (MeetsBack(scene_.world, hit)) {
-        work.backs += 1;
-        work.nearest_back = std::min(work.nearest_back, hit.t);
-      }
-      escaped_ += hit ? 0 : 1;
-      Rgb radiance = FoundByGather(scene_, lights_ ? &*lights_ : nullptr, work.choice, point.surface, dir, pdf, hit);
-      if (hit) {
-        const GatheredRadiance reflected = ReflectedRadiance(scene_, hit, ray_key, counters_);
-        radiance += reflected.radiance;
-        for (size_t g = 0; g < kVarianceGroups; ++g)
-          work.group[g] += reflected.group[g] * (local.z / (pdf * drawn.density));
-      }
-      if (!IsFinite(radiance)) {
-        ++counters_.bad_samples;
-        continue;
-      }
-      // Multiple importance sampling went by the unguided density, here as in GatherDirect.
-      radiance = radiance / drawn.density;
-      const Rgb irradiance = radiance * (local.z / pdf);
-      if (collects_) found_.Add(hit ? scene_.world.PointAt(hit).position : dir, !hit, Luminance(irradiance));
-      work.indirect.AddIrradiance(i, end, irradiance);
-      work.indirect.AddSh(dir, radiance / pdf);
+    std::array<GatherRay, kAhead> rays;
+    for (uint32_t i = begin; i < end; i += kAhead) {
+      size_t traced = 0;
+      for (uint32_t k = i; k < std::min(i + kAhead, end); ++k) traced += Trace(work, set, k, rays[traced]) ? 1 : 0;
+      for (const GatherRay& ray : std::span(rays).first(traced)) AddFound(work, ray, end);
     }
+  }
+
+  // False where the texel's point lies inside other geometry.
+  bool Trace(Work& work, const SobolSet& set, uint32_t sample, GatherRay& ray) {
+    const SobolPoint u = set.At(sample);
+    const TexelPoint point = work.sampler.At(u.Get2(2));
+    if (!point.valid) return false;
+    const GatherGuide::Sample drawn = work.guide ? work.guide->Draw(u.Get2(0)) : GatherGuide::Sample{u.Get2(0), 1};
+    const Vec3f local = GatherHemisphere(drawn.primary), dir = point.frame.ToWorld(local);
+    const uint32_t key = HashCombine(work.key, 0x80000000u | sample);
+    ray = {sample, key, point.surface, dir, local.z, drawn.density, {}};
+    ray.hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, key));
+    if (ray.hit) __builtin_prefetch(&CacheAt(scene_, scene_.world.PointAt(ray.hit), ray.hit.back));
+    return true;
+  }
+
+  void AddFound(Work& work, const GatherRay& ray, uint32_t planned) {
+    work.indirect.Count();
+    ++counters_.gather_rays;
+    if (MeetsBack(scene_.world, ray.hit)) {
+      work.backs += 1;
+      work.nearest_back = std::min(work.nearest_back, ray.hit.t);
+    }
+    escaped_ += ray.hit ? 0 : 1;
+    const float pdf = GatherPdf(ray.cosine);
+    Rgb radiance = FoundByGather(scene_, lights_ ? &*lights_ : nullptr, work.choice, ray.from, ray.dir, pdf, ray.hit);
+    if (ray.hit) {
+      const GatheredRadiance reflected = ReflectedRadiance(scene_, ray.hit, ray.key, counters_);
+      radiance += reflected.radiance;
+      const float weight = ray.cosine / (pdf * ray.density);
+      for (size_t g = 0; g < kVarianceGroups; ++g) work.group[g] += reflected.group[g] * weight;
+    }
+    if (!IsFinite(radiance)) {
+      ++counters_.bad_samples;
+      return;
+    }
+    // Multiple importance sampling went by the unguided density, here as in GatherDirect.
+    radiance = radiance / ray.density;
+    const Rgb irradiance = radiance * (ray.cosine / pdf);
+    if (collects_) {
+      found_.Add(ray.hit ? scene_.world.PointAt(ray.hit).position : ray.dir, !ray.hit, Luminance(irradiance));
+    }
+    work.indirect.AddIrradiance(ray.sample, planned, irradiance);
+    work.indirect.AddSh(ray.dir, radiance / pdf);
   }
 
   // Which of its neighbours each texel is connected to, on the grid and for the page's filter.
@@ -326,29 +355,34 @@ class TileGatherer {
       indirect_samples.push_back(work.indirect_samples);
       light.push_back(Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance()));
     }
-    const TilePool pool(map_, begin_, Valid());
+    std::vector<bool> valid = Valid();
+    valid_ = static_cast<size_t>(std::count(valid.begin(), valid.end(), true));
+    const TilePool pool(map_, begin_, std::move(valid));
     const std::vector<float> pooled_direct = pool.Variance(direct, direct_samples);
     std::vector<float> pooled_indirect = pool.Variance(indirect, indirect_samples);
     // A stray sample must not raise its own tolerance: neighbours or the smoothed light judge.
-    const bool any = Grant(pooled_direct, pooled_indirect, pool.Mean(light));
-    if (!any || !options_.filter || options_.target_error <= 0) return;
-    const std::vector<SmoothGrid::Smoothed> smooth = SmoothIndirect(indirect);
+    const std::vector<Claim> unfiltered = Claims(pooled_direct, pooled_indirect, pool.Mean(light));
+    if (!options_.filter || options_.target_error <= 0 || IsMet(unfiltered, valid_)) return Grant(unfiltered);
+    if (smoothed_.empty() || changed_ > kChangedShare * static_cast<float>(work_.size())) {
+      smoothed_ = SmoothIndirect(indirect);
+      changed_ = 0;
+    }
     for (size_t i = 0; i < work_.size(); ++i) {
       // What the window's texels say of their variance may have missed what is rare.
-      const float filtered = std::max(smooth[i].variance, smooth[i].square * pooled_indirect[i]);
+      const float filtered = std::max(smoothed_[i].variance, smoothed_[i].square * pooled_indirect[i]);
       pooled_indirect[i] = std::min(pooled_indirect[i], filtered);
-      light[i] = Luminance(work_[i].direct.Irradiance()) + smooth[i].value;
+      light[i] = Luminance(work_[i].direct.Irradiance()) + smoothed_[i].value;
     }
-    Grant(pooled_direct, pooled_indirect, light);
+    Grant(Claims(pooled_direct, pooled_indirect, light));
   }
 
-  // Makes active who gets more samples, by variances and irradiance a texel; without a target everybody. False: nobody.
-  bool Grant(const std::vector<float>& direct, const std::vector<float>& indirect, const std::vector<float>& light) {
+  // By variances and irradiance a texel; two for each, of direct and of indirect light.
+  std::vector<Claim> Claims(const std::vector<float>& direct, const std::vector<float>& indirect,
+                            const std::vector<float>& light) const {
     std::vector<Claim> claims;
-    size_t texels = 0;
+    claims.reserve(2 * work_.size());
     for (size_t i = 0; i < work_.size(); ++i) {
       const Work& work = work_[i];
-      texels += work.valid ? 1 : 0;
       const float tolerated = Tolerated(light[i]);
       const auto claim = [&](bool has, int samples, float cost, float variance) {
         const float error = variance > 0 ? std::min(variance / (kMargin * tolerated * tolerated), kBoundless) : 0;
@@ -358,15 +392,17 @@ class TileGatherer {
       claim(work.has_direct, work.direct_samples, 1, direct[i]);
       claim(work.has_indirect, work.indirect_samples, kGatherCost, indirect[i]);
     }
+    return claims;
+  }
+
+  // Makes active who gets more samples: without a target everybody.
+  void Grant(const std::vector<Claim>& claims) {
     const std::vector<bool> granted =
-        options_.target_error > 0 ? Allot(claims, texels) : std::vector<bool>(claims.size(), true);
-    bool any = false;
+        options_.target_error > 0 ? Allot(claims, valid_) : std::vector<bool>(claims.size(), true);
     for (size_t i = 0; i < work_.size(); ++i) {
       work_[i].direct_active = claims[2 * i].doublings > 0 && granted[2 * i];
       work_[i].indirect_active = claims[2 * i + 1].doublings > 0 && granted[2 * i + 1];
-      any = any || work_[i].direct_active || work_[i].indirect_active;
     }
-    return any;
   }
 
   const GatherScene& scene_;
@@ -381,7 +417,10 @@ class TileGatherer {
   int64_t escaped_ = 0;  // gather rays
   Distant distant_ = Distant::kSampled;
   std::optional<SmoothTile> smooth_;
+  std::vector<SmoothGrid::Smoothed> smoothed_;  // indirect light, when it was last looked at as a whole
+  float changed_ = 0;                           // texels whose indirect light went on since
   std::vector<Work> work_;
+  size_t valid_ = 0;  // texels
 };
 
 }  // namespace

@@ -63,6 +63,7 @@ class NumberWriter {
 
 void Put(float value, NumberWriter& writer) { writer.Put(value); }
 void Put(int64_t value, NumberWriter& writer) { writer.Put(value); }
+void Put(uint16_t value, NumberWriter& writer) { writer.Put(value); }
 void Put(const Rgb& value, NumberWriter& writer) {
   for (const float channel : {value.x, value.y, value.z}) Put(channel, writer);
 }
@@ -73,6 +74,7 @@ void Put(const std::array<T, kCount>& values, NumberWriter& writer) {
 
 void Get(NumberReader& reader, float& value) { value = reader.Get<float>(); }
 void Get(NumberReader& reader, int64_t& value) { value = reader.Get<int64_t>(); }
+void Get(NumberReader& reader, uint16_t& value) { value = reader.Get<uint16_t>(); }
 void Get(NumberReader& reader, Rgb& value) {
   Get(reader, value.x);
   Get(reader, value.y);
@@ -138,8 +140,8 @@ void GetTexel(NumberReader& reader, TexelLight& light) {
 }
 
 constexpr size_t kTexelBytes = 4 * (2 * (3 + 27 + 3) + 1) + 2 + 8;
-constexpr size_t kCellBytes = 4 * 6 + 4 * kVarianceGroups + 1;
-constexpr size_t kFluxBytes = 8 + 4 + sizeof(CellFlux::direct) + sizeof(CellFlux::indirect) + sizeof(CellFlux::group);
+constexpr size_t kCellBytes = sizeof(Rgb) + sizeof(CachedLight::group_share) + 1;
+constexpr size_t kFluxBytes = 8 + 4 + sizeof(CellFlux::flux) + sizeof(CellFlux::group);
 constexpr size_t kHeadBytes = 1024;  // what precedes the texels, cells or photons, about
 
 }  // namespace
@@ -154,8 +156,7 @@ std::string SerializePhotons(const PhotonMap& map) {
     if (flux.count == 0) continue;
     writer.Put(static_cast<uint64_t>(i));
     writer.Put(flux.count);
-    Put(flux.direct, writer);
-    Put(flux.indirect, writer);
+    Put(flux.flux, writer);
     Put(flux.group, writer);
   }
   return std::move(writer).bytes();
@@ -169,29 +170,26 @@ absl::Status AddPhotons(std::string_view bytes, PhotonMap& into) {
     const uint64_t index = reader.Get<uint64_t>();
     CellFlux flux;
     flux.count = reader.Get<uint32_t>();
-    Get(reader, flux.direct);
-    Get(reader, flux.indirect);
+    Get(reader, flux.flux);
     Get(reader, flux.group);
     if (index >= into.flux.size()) return absl::DataLossError("photons: of a cell that is not there");
     CellFlux& sum = into.flux[index];
     sum.count += flux.count;
-    Add(flux.direct, sum.direct);
-    Add(flux.indirect, sum.indirect);
+    Add(flux.flux, sum.flux);
     Add(flux.group, sum.group);
   }
   return reader.Finish("photons");
 }
 
 std::string SerializeCache(const RadianceCache& cache) {
-  NumberWriter writer(kHeadBytes + kCellBytes * cache.irradiance.size());
+  NumberWriter writer(kHeadBytes + kCellBytes * cache.light.size());
   Put(cache.photons_seen, writer);
   Put(cache.rays, writer);
-  writer.Put(static_cast<uint64_t>(cache.irradiance.size()));
-  for (size_t i = 0; i < cache.irradiance.size(); ++i) {
-    Put(cache.irradiance[i].direct, writer);
-    Put(cache.irradiance[i].indirect, writer);
-    Put(cache.group[i], writer);
-    writer.Put(cache.window[i]);
+  writer.Put(static_cast<uint64_t>(cache.light.size()));
+  for (const CachedLight& light : cache.light) {
+    Put(light.irradiance, writer);
+    Put(light.group_share, writer);
+    writer.Put(light.window);
   }
   return std::move(writer).bytes();
 }
@@ -203,14 +201,11 @@ absl::StatusOr<RadianceCache> ParseCache(std::string_view bytes) {
   Get(reader, cache.rays);
   const uint64_t count = reader.Get<uint64_t>();
   if (count > reader.remaining() / kCellBytes) return absl::DataLossError("radiance cache: impossible count");
-  cache.irradiance.resize(count);
-  cache.group.resize(count);
-  cache.window.resize(count);
-  for (size_t i = 0; i < count; ++i) {
-    Get(reader, cache.irradiance[i].direct);
-    Get(reader, cache.irradiance[i].indirect);
-    Get(reader, cache.group[i]);
-    cache.window[i] = reader.Get<uint8_t>();
+  cache.light.resize(count);
+  for (CachedLight& light : cache.light) {
+    Get(reader, light.irradiance);
+    Get(reader, light.group_share);
+    light.window = reader.Get<uint8_t>();
   }
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("radiance cache"));
   return cache;

@@ -235,7 +235,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
     BAKEWELL_ASSIGN_OR_RETURN(const Blob bytes, FindInput(work.inputs, "cache"));
     auto made = std::make_shared<Photons>();
     BAKEWELL_ASSIGN_OR_RETURN(made->cache, ParseCache(*bytes));
-    if (made->cache.irradiance.size() != 2 * stage->cells.cells().size()) {
+    if (made->cache.light.size() != 2 * stage->cells.cells().size()) {
       return absl::InvalidArgumentError("the radiance cache is of other cells");
     }
     made->mean_irradiance = MeanIrradiance(*level->texels, stage->cells, made->cache);

@@ -78,8 +78,8 @@ namespace {
 double AddIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache, double sum) {
   for (const Texel& texel : texels.texels) {
     const uint32_t triangle = texels.fragments[texel.fragment_begin].triangle;
-    const CellIrradiance& light = cache.irradiance[2 * static_cast<size_t>(cells.CellAt(triangle, texel.position))];
-    sum += static_cast<double>(Luminance(light.direct + light.indirect));
+    sum += static_cast<double>(
+        Luminance(cache.light[2 * static_cast<size_t>(cells.CellAt(triangle, texel.position))].irradiance));
   }
   return sum;
 }

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "worker/sample/warp.h"
+
 namespace bakewell {
 namespace {
 
@@ -14,12 +16,34 @@ Vec3f DirectionOf(float u, float v) {
 
 }  // namespace
 
+SphereTable::SphereTable(int width, int height, std::span<const float> weights) : cells_(width, height, weights) {
+  const double step = kPi / height;
+  for (int y = 0; y <= height; ++y) cosine_.push_back(static_cast<float>(std::cos(y * step)));
+  for (int y = 0; y < height; ++y) {
+    solid_angle_.push_back(static_cast<float>((std::cos(y * step) - std::cos((y + 1) * step)) * 2 * kPi / width));
+  }
+}
+
+SphereTable::Sample SphereTable::Draw(Vec2f u) const {
+  const auto cell = cells_.Draw(u);
+  // Uniform in solid angle within the cell: rows are cut by cosine, not by angle.
+  const auto row = static_cast<size_t>(cell.y);
+  const float within = cell.position.y * static_cast<float>(height()) - static_cast<float>(cell.y);
+  const float y = cosine_[row] + (cosine_[row + 1] - cosine_[row]) * within;
+  const Vec2f around = Circle(cell.position.x) * std::sqrt(std::max(0.0f, 1 - y * y));
+  return {{around.x, y, around.y}, Pdf(cell.x, cell.y), cell.x, cell.y};
+}
+
+float SphereTable::Pdf(int x, int y) const {
+  return cells_.Pdf(x, y) / (static_cast<float>(width()) * static_cast<float>(height())) / CellSolidAngle(y);
+}
+
 EnvironmentLight::EnvironmentLight(const Environment& environment) : environment_(environment) {
   const bool map = environment.type == EnvironmentType::kLatLong;
   const int w = map ? environment.width : 64, h = map ? environment.height : 32;
   std::vector<float> weights(static_cast<size_t>(w) * static_cast<size_t>(h));
   Vec3d fluence;
-  table_ = Distribution2D(w, h, weights);
+  table_ = SphereTable(w, h, weights);
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       const Rgb radiance = Radiance(CellCenter(x, y));
@@ -28,7 +52,7 @@ EnvironmentLight::EnvironmentLight(const Environment& environment) : environment
       fluence += ToDouble(radiance) * static_cast<double>(CellSolidAngle(y));
     }
   }
-  table_ = Distribution2D(w, h, weights);
+  table_ = SphereTable(w, h, weights);
   fluence_ = ToFloat(fluence);
   bright_ = MaxComponent(fluence_) > 0;
 }
@@ -36,11 +60,6 @@ EnvironmentLight::EnvironmentLight(const Environment& environment) : environment
 Vec3f EnvironmentLight::CellCenter(int x, int y) const {
   return DirectionOf((static_cast<float>(x) + 0.5f) / static_cast<float>(width()),
                      (static_cast<float>(y) + 0.5f) / static_cast<float>(height()));
-}
-
-float EnvironmentLight::CellSolidAngle(int y) const {
-  const double step = kPi / height();
-  return static_cast<float>((std::cos(y * step) - std::cos((y + 1) * step)) * 2 * kPi / width());
 }
 
 void EnvironmentLight::CellOf(Vec3f dir, int& x, int& y) const {
@@ -69,24 +88,10 @@ Rgb EnvironmentLight::Radiance(Vec3f dir) const {
       .latlong[static_cast<size_t>(y) * static_cast<size_t>(environment_.width) + static_cast<size_t>(x)];
 }
 
-EnvironmentLight::Sample EnvironmentLight::Draw(Vec2f u) const {
-  const auto cell = table_.Draw(u);
-  // Uniform in solid angle within the cell: rows are cut by cosine, not by angle.
-  const float step = kPiF / static_cast<float>(height());
-  const float top = std::cos(static_cast<float>(cell.y) * step),
-              bottom = std::cos(static_cast<float>(cell.y + 1) * step);
-  const float within = cell.position.y * static_cast<float>(height()) - static_cast<float>(cell.y);
-  const float y = top + (bottom - top) * within;
-  const float s = std::sqrt(std::max(0.0f, 1 - y * y)), phi = cell.position.x * 2 * kPiF;
-  const float cells = static_cast<float>(width()) * static_cast<float>(height());
-  return {{s * std::cos(phi), y, s * std::sin(phi)}, cell.pdf / cells / CellSolidAngle(cell.y)};
-}
-
 float EnvironmentLight::Pdf(Vec3f dir) const {
   int x = 0, y = 0;
   CellOf(dir, x, y);
-  const float cells = static_cast<float>(width()) * static_cast<float>(height());
-  return table_.Pdf(x, y) / cells / CellSolidAngle(y);
+  return table_.Pdf(x, y);
 }
 
 }  // namespace bakewell

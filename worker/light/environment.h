@@ -1,9 +1,37 @@
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "core/scene/scene.h"
 #include "worker/sample/distribution.h"
 
 namespace bakewell {
+
+// Directions over the sphere with a density that is constant in each cell of a latitude-longitude grid, row 0 at +Y.
+class SphereTable {
+ public:
+  SphereTable() = default;
+  // Weights: of whole cells.
+  SphereTable(int width, int height, std::span<const float> weights);
+
+  struct Sample {
+    Vec3f dir;      // unit
+    float pdf = 0;  // per steradian
+    int x = 0, y = 0;
+  };
+  Sample Draw(Vec2f u) const;
+  float Pdf(int x, int y) const;
+  int width() const { return cells_.width(); }
+  int height() const { return cells_.height(); }
+  // Solid angle of a cell of row y [sr].
+  float CellSolidAngle(int y) const { return solid_angle_[static_cast<size_t>(y)]; }
+
+ private:
+  Distribution2D cells_;
+  std::vector<float> cosine_;       // of the polar angle at the top of each row, and at the last one's bottom
+  std::vector<float> solid_angle_;  // of a cell, per row
+};
 
 // Distant light around the scene, with a table to sample it by luminance. Directions are unit, world frame.
 class EnvironmentLight {
@@ -18,12 +46,8 @@ class EnvironmentLight {
 
   Rgb Radiance(Vec3f dir) const;
 
-  struct Sample {
-    Vec3f dir;
-    float pdf = 0;  // per steradian
-  };
   // Directions by luminance (of the table's cells).
-  Sample Draw(Vec2f u) const;
+  SphereTable::Sample Draw(Vec2f u) const { return table_.Draw(u); }
   float Pdf(Vec3f dir) const;
   // Integral of radiance over the sphere [W m^-2].
   Rgb Fluence() const { return fluence_; }
@@ -32,13 +56,12 @@ class EnvironmentLight {
   int width() const { return table_.width(); }
   int height() const { return table_.height(); }
   Vec3f CellCenter(int x, int y) const;
-  // Solid angle of a cell of row y [sr].
-  float CellSolidAngle(int y) const;
+  float CellSolidAngle(int y) const { return table_.CellSolidAngle(y); }
 
  private:
   void CellOf(Vec3f dir, int& x, int& y) const;
   Environment environment_;
-  Distribution2D table_;
+  SphereTable table_;
   bool bright_ = false;
   Rgb fluence_;
 };

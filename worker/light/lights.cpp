@@ -56,6 +56,8 @@ LightSet::LightSet(const World& world, const Environment& environment) : world_(
   for (const PunctualLight& light : world.scene().lights) {
     if (MaxComponent(light.intensity) <= 0) continue;
     (light.type == LightType::kDirectional ? directionals_ : locals_).push_back(light);
+    if (light.type != LightType::kDirectional) continue;
+    discs_.push_back({FrameFromHint(-light.direction, light.tangent), std::sin(0.5f * light.angular_diameter_rad)});
   }
   std::map<GlowKey, int> glowing;
   for (uint32_t k = 0; k < world.triangles().size(); ++k) {
@@ -147,12 +149,11 @@ LightSample LightSet::SampleDirectional(int directional, Vec2f u) const {
   if (light.angular_diameter_rad <= 0) return sample;
   // Uniform over the disc's projection, whose density per steradian is cos/(pi sin^2 radius); radiance is
   // E/(pi sin^2 radius), so that each point brings E/cos.
-  const float sin_radius = std::sin(0.5f * light.angular_diameter_rad);
-  const Vec2f d = DiscFromSquare(u) * sin_radius;
+  const Disc& disc = discs_[static_cast<size_t>(directional)];
+  const Vec2f d = DiscFromSquare(u) * disc.sin_radius;
   const float z = std::sqrt(std::max(0.0f, 1 - d.x * d.x - d.y * d.y));
-  const Vec3f bitangent = Cross(light.direction, light.tangent);
-  sample.dir = NormalizeOrZero(light.tangent * d.x + bitangent * d.y - light.direction * z);
-  sample.perpendicular = light.intensity / z;
+  sample.dir = disc.across.ToWorld({d.x, d.y, z});
+  sample.perpendicular = light.intensity * (1 / z);
   return sample;
 }
 

@@ -60,11 +60,16 @@ class LightSet {
   float Power(int light) const;
 
  private:
+  struct Disc {
+    Frame across;  // n: towards the light
+    float sin_radius = 0;
+  };
   LightSample SampleTriangle(const EmissiveTriangle& light, Vec3f position, Vec2f u) const;
   float ImportanceOfTriangle(const EmissiveTriangle& light, Vec3f position, Vec3f normal, float radius) const;
 
   const World& world_;
   std::vector<PunctualLight> locals_, directionals_;
+  std::vector<Disc> discs_;  // of the directional lights
   std::vector<EmissiveTriangle> emissive_;
   std::vector<int> light_of_triangle_;  // one per triangle, empty where nothing emits
   EnvironmentLight environment_;

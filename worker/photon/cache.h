@@ -9,20 +9,21 @@
 
 namespace bakewell {
 
-// Irradiance of one side of one cell, estimated from photons [W m^-2].
-struct CellIrradiance {
-  Rgb direct;    // straight from lights
-  Rgb indirect;  // after at least one bounce
-};
-
-// The photon map as the gather reads it: O(1) per look-up. Element 2 * cell + side.
-struct RadianceCache {
-  std::vector<CellIrradiance> irradiance;
-  // Per group: luminance of irradiance (direct + indirect) as that eighth of the photons sees it, for the variance.
-  std::vector<std::array<float, kVarianceGroups>> group;
+// What photons say of one side of one cell: half a cache line, since look-ups are as good as random.
+struct alignas(32) CachedLight {
+  Rgb irradiance;  // [W m^-2]
+  // Per group: irradiance as that eighth of the photons sees it, over the mean of all groups, in 1/kShareUnit.
+  std::array<uint16_t, kVarianceGroups> group_share{};
   // Side of the neighbourhood that was averaged, in cells (1, 3, 5, ...); 0: the cell is cut by other geometry, part of
   // it may lie behind a wall, and its value is no evidence.
-  std::vector<uint8_t> window;
+  uint8_t window = 1;
+
+  static constexpr float kShareUnit = 65535.0f / kVarianceGroups;
+};
+
+// The photon map as the gather reads it: O(1) per look-up.
+struct RadianceCache {
+  std::vector<CachedLight> light;  // element 2 * cell + side
   int64_t photons_seen = 0;
   int64_t rays = 0;
   SkipCount unfaced_backs;  // sides of cells whose patch no photon met, of those with surface; rays

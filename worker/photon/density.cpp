@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <numeric>
 
 #include "worker/photon/cache.h"
 
@@ -20,9 +21,7 @@ class Estimator {
   Estimator(const World& world, const SurfaceCells& cells, const PhotonMap& map, const PhotonPlan& plan,
             const DensityOptions& options)
       : world_(world), cells_(cells), map_(map), inverse_scale_(1 / plan.fixed_point_scale), options_(options) {
-    cache_.irradiance.resize(map.flux.size());
-    cache_.group.resize(map.flux.size());
-    cache_.window.assign(map.flux.size(), 1);
+    cache_.light.resize(map.flux.size());
     open_.assign(map.flux.size(), 0);
     cut_.assign(map.flux.size(), 0);
   }
@@ -118,7 +117,7 @@ class Estimator {
   }
 
   struct Sum {
-    std::array<double, 3> direct{}, indirect{};
+    std::array<double, 3> flux{};
     std::array<double, kVarianceGroups> group{};
     double area = 0;
     int64_t count = 0;
@@ -127,8 +126,7 @@ class Estimator {
   void AddCell(size_t i, Sum& sum) const {
     const CellFlux& flux = map_.flux[i];
     for (size_t c = 0; c < 3; ++c) {
-      sum.direct[c] += static_cast<double>(flux.direct[c]);
-      sum.indirect[c] += static_cast<double>(flux.indirect[c]);
+      sum.flux[c] += static_cast<double>(flux.flux[c]);
     }
     for (size_t g = 0; g < kVarianceGroups; ++g) sum.group[g] += static_cast<double>(flux.group[g]);
     sum.area += static_cast<double>(cells_.cells()[i / 2].area);
@@ -192,15 +190,14 @@ class Estimator {
 
   void Store(size_t i, const Sum& sum, int radius) {
     const double per_area = inverse_scale_ / sum.area;
-    const auto rgb = [&](const std::array<double, 3>& flux) {
-      return Rgb{static_cast<float>(flux[0] * per_area), static_cast<float>(flux[1] * per_area),
-                 static_cast<float>(flux[2] * per_area)};
-    };
-    cache_.irradiance[i] = {rgb(sum.direct), rgb(sum.indirect)};
-    for (size_t g = 0; g < kVarianceGroups; ++g) {
-      cache_.group[i][g] = static_cast<float>(sum.group[g] * per_area * kVarianceGroups);
+    CachedLight& light = cache_.light[i];
+    light.irradiance = {static_cast<float>(sum.flux[0] * per_area), static_cast<float>(sum.flux[1] * per_area),
+                        static_cast<float>(sum.flux[2] * per_area)};
+    const double all = std::accumulate(sum.group.begin(), sum.group.end(), 0.0);
+    for (size_t g = 0; g < kVarianceGroups && all > 0; ++g) {
+      light.group_share[g] = static_cast<uint16_t>(65535 * (sum.group[g] / all) + 0.5);
     }
-    cache_.window[i] = cut_[i] ? 0 : static_cast<uint8_t>(2 * radius + 1);
+    light.window = cut_[i] ? 0 : static_cast<uint8_t>(2 * radius + 1);
   }
 
   const World& world_;

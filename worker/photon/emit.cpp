@@ -101,7 +101,7 @@ class Emitter {
   const PhotonPlan& plan_;
 };
 
-void Add(int64_t& sum, int64_t value) { std::atomic_ref<int64_t>(sum).fetch_add(value, std::memory_order_relaxed); }
+void AddTo(int64_t& sum, int64_t value) { std::atomic_ref<int64_t>(sum).fetch_add(value, std::memory_order_relaxed); }
 
 using Fixed = std::array<int64_t, 3>;
 
@@ -114,23 +114,24 @@ class Tracer {
   void Trace(const Photon& photon, const SobolPoint& u, int group) {
     Ray ray{photon.origin, photon.dir, kInfinity, photon.key, photon.from};
     Rgb flux = photon.flux;
-    Accumulate(totals_.emitted, ToFixed(flux));
+    Fixed fixed = ToFixed(flux);
+    Accumulate(totals_.emitted, fixed);
     for (int bounce = 0;; ++bounce) {
       ++totals_.rays;
       const Hit hit = world_.Intersect(ray);
-      if (!hit) return Accumulate(totals_.escaped, ToFixed(flux));
+      if (!hit) return Accumulate(totals_.escaped, fixed);
       const SurfacePoint point = world_.PointAt(hit);
-      Deposit(hit, point, flux, bounce, group);
+      Deposit(hit, point, fixed, ToFixed(Luminance(flux)), group);
       const Rgb albedo = world_.AlbedoAt(hit);
       const float survive = MaxComponent(albedo);
-      const Fixed before = ToFixed(flux);
       if (bounce + 1 == kMaxPhotonBounces) ++totals_.cut_paths;
       if (Random(photon, u, bounce, 2) >= survive || bounce + 1 == kMaxPhotonBounces) {
-        return Accumulate(totals_.absorbed, before);
+        return Accumulate(totals_.absorbed, fixed);
       }
       flux = flux * albedo / survive;
       const Fixed after = ToFixed(flux);
-      Accumulate(totals_.absorbed, {before[0] - after[0], before[1] - after[1], before[2] - after[2]});
+      Accumulate(totals_.absorbed, {fixed[0] - after[0], fixed[1] - after[1], fixed[2] - after[2]});
+      fixed = after;
       const Frame frame = FrameFromHint(point.normal, world_.triangles()[hit.triangle].e1);
       const Vec2f scatter{Random(photon, u, bounce, 0), Random(photon, u, bounce, 1)};
       ray = RayFrom(point, frame.ToWorld(CosineHemisphere(scatter)), kInfinity,
@@ -138,16 +139,17 @@ class Tracer {
     }
   }
 
-  // Adds this thread's totals to the map's.
+  // Adds what waits, and this thread's totals, to the map's.
   void Flush() {
+    for (Waiting& waiting : waiting_) Add(waiting);
     for (size_t c = 0; c < 3; ++c) {
-      Add(map_.totals.emitted[c], totals_.emitted[c]);
-      Add(map_.totals.absorbed[c], totals_.absorbed[c]);
-      Add(map_.totals.escaped[c], totals_.escaped[c]);
+      AddTo(map_.totals.emitted[c], totals_.emitted[c]);
+      AddTo(map_.totals.absorbed[c], totals_.absorbed[c]);
+      AddTo(map_.totals.escaped[c], totals_.escaped[c]);
     }
-    Add(map_.totals.rays, totals_.rays);
-    Add(map_.totals.deposits, totals_.deposits);
-    Add(map_.totals.cut_paths, totals_.cut_paths);
+    AddTo(map_.totals.rays, totals_.rays);
+    AddTo(map_.totals.deposits, totals_.deposits);
+    AddTo(map_.totals.cut_paths, totals_.cut_paths);
   }
 
  private:
@@ -157,23 +159,37 @@ class Tracer {
     return UnitFloat(HashCombine(photon.key, static_cast<uint32_t>(4 * bounce + what)));
   }
 
-  Fixed ToFixed(Rgb flux) const {
-    return {std::llrint(static_cast<double>(flux.x) * scale_), std::llrint(static_cast<double>(flux.y) * scale_),
-            std::llrint(static_cast<double>(flux.z) * scale_)};
-  }
+  int64_t ToFixed(float flux) const { return std::llrint(static_cast<double>(flux) * scale_); }
+  Fixed ToFixed(Rgb flux) const { return {ToFixed(flux.x), ToFixed(flux.y), ToFixed(flux.z)}; }
 
   static void Accumulate(Fixed& sum, const Fixed& value) {
     for (size_t c = 0; c < 3; ++c) sum[c] += value[c];
   }
 
-  void Deposit(const Hit& hit, const SurfacePoint& point, Rgb flux, int bounce, int group) {
+  // Flux on its way to a cell, which is seldom in the processor's caches.
+  struct Waiting {
+    CellFlux* cell = nullptr;
+    Fixed flux{};
+    int64_t luminance = 0;
+    int group = 0;
+  };
+
+  void Deposit(const Hit& hit, const SurfacePoint& point, const Fixed& flux, int64_t luminance, int group) {
     const uint32_t cell = cells_.CellAt(hit.triangle, point.position);
     CellFlux& target = map_.flux[2 * static_cast<size_t>(cell) + (hit.back ? 1 : 0)];
-    const Fixed fixed = ToFixed(flux);
-    for (size_t c = 0; c < 3; ++c) Add(bounce == 0 ? target.direct[c] : target.indirect[c], fixed[c]);
-    Add(target.group[static_cast<size_t>(group)], std::llrint(static_cast<double>(Luminance(flux)) * scale_));
-    std::atomic_ref<uint32_t>(target.count).fetch_add(1, std::memory_order_relaxed);
-    ++totals_.deposits;
+    __builtin_prefetch(&target.flux, 1);
+    __builtin_prefetch(&target.group[static_cast<size_t>(group)], 1);
+    Waiting& oldest = waiting_[static_cast<size_t>(totals_.deposits++) % waiting_.size()];
+    Add(oldest);
+    oldest = {&target, flux, luminance, group};
+  }
+
+  void Add(const Waiting& waiting) {
+    if (waiting.cell == nullptr) return;
+    CellFlux& cell = *waiting.cell;
+    for (size_t c = 0; c < 3; ++c) AddTo(cell.flux[c], waiting.flux[c]);
+    AddTo(cell.group[static_cast<size_t>(waiting.group)], waiting.luminance);
+    std::atomic_ref<uint32_t>(cell.count).fetch_add(1, std::memory_order_relaxed);
   }
 
   const World& world_;
@@ -181,6 +197,7 @@ class Tracer {
   const double scale_;
   PhotonMap& map_;
   PhotonTotals totals_;
+  std::array<Waiting, 8> waiting_;
 };
 
 float UsefulFlux(const LightSet& lights, const EmissionGuide& guide, const PhotonSource& source) {

@@ -36,10 +36,9 @@ PhotonPlan PlanPhotons(const LightSet& lights, const EmissionGuide& guide, int64
 // Flux that arrived on one side of one cell, in fixed point: addition is exact and commutes, so batches may run
 // anywhere and in any order.
 struct CellFlux {
-  std::array<int64_t, 3> direct{};               // photons that come straight from a light
-  std::array<int64_t, 3> indirect{};             // photons that were scattered before
-  std::array<int64_t, kVarianceGroups> group{};  // luminance of both, by photon group
-  uint32_t count = 0;                            // photons of both kinds
+  std::array<int64_t, 3> flux{};
+  uint32_t count = 0;                            // photons
+  std::array<int64_t, kVarianceGroups> group{};  // luminance, by photon group
 };
 
 // Totals of the pass, fixed point as well: emitted = absorbed + escaped.

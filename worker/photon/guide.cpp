@@ -215,7 +215,7 @@ void EmissionGuide::FinishSky(const EnvironmentLight& sky, const Marks& marks) {
       flux += static_cast<double>(power);
     }
   }
-  sky_direction_ = Distribution2D(sky_width_, sky_height_, weights);
+  sky_direction_ = SphereTable(sky_width_, sky_height_, weights);
   sky_useful_ = flux > 0 ? static_cast<float>(useful_flux / flux) : 1.0f;
 }
 
@@ -225,19 +225,9 @@ EmissionGuide::SquarePoint EmissionGuide::Draw(const Distribution2D& table, Vec2
 }
 
 EmissionGuide::SkyPoint EmissionGuide::DrawSky(Vec2f u_direction, Vec2f u_position) const {
-  const auto cell = sky_direction_.Draw(u_direction);
-  const float step = kPiF / static_cast<float>(sky_height_);
-  const float top = std::cos(static_cast<float>(cell.y) * step),
-              bottom = std::cos(static_cast<float>(cell.y + 1) * step);
-  const float within = cell.position.y * static_cast<float>(sky_height_) - static_cast<float>(cell.y);
-  const float y = top + (bottom - top) * within;
-  const float s = std::sqrt(std::max(0.0f, 1 - y * y)), phi = cell.position.x * 2 * kPiF;
-  const float solid_angle = (top - bottom) * 2 * kPiF / static_cast<float>(sky_width_);
-  const float cells = static_cast<float>(sky_width_) * static_cast<float>(sky_height_);
-  const Vec3f dir{s * std::cos(phi), y, s * std::sin(phi)};
-  SkyPoint point{SkyToWorld(dir), SkySquare(dir), cell.pdf / cells / solid_angle, {}};
-  point.point = Draw(sky_position_[static_cast<size_t>(SkyBin(cell.x, cell.y))], u_position);
-  return point;
+  const SphereTable::Sample sky = sky_direction_.Draw(u_direction);
+  return {SkyToWorld(sky.dir), SkySquare(sky.dir), sky.pdf,
+          Draw(sky_position_[static_cast<size_t>(SkyBin(sky.x, sky.y))], u_position)};
 }
 
 }  // namespace bakewell

@@ -70,7 +70,7 @@ class EmissionGuide {
 
   std::vector<Distribution2D> sun_;
   std::vector<float> sun_useful_;
-  Distribution2D sky_direction_;              // over the environment's table
+  SphereTable sky_direction_;                 // over the environment's table
   std::vector<Distribution2D> sky_position_;  // per direction bin
   int sky_width_ = 1, sky_height_ = 1;
   Frame sky_axes_;  // n: up, t: azimuth 0

@@ -1,6 +1,7 @@
 #include "worker/sample/distribution.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "core/base/check.h"
 
@@ -14,11 +15,20 @@ Distribution1D::Distribution1D(std::span<const float> weights) : cdf_(weights.si
     cdf_[i] = total_ > 0 ? cdf_[i] / total_ : static_cast<double>(i) / static_cast<double>(weights.size());
   }
   cdf_.back() = 1;
+  constexpr size_t kFew = 16, kPerStart = 4;
+  if (weights.size() <= kFew) return;
+  begin_.resize(std::bit_floor(weights.size() / kPerStart));  // u times a power of two is exact
+  uint32_t cell = 0;
+  for (size_t i = 0; i < begin_.size(); ++i) {
+    while (cdf_[cell + 1] <= static_cast<double>(i) / static_cast<double>(begin_.size())) ++cell;
+    begin_[i] = cell;
+  }
 }
 
 Distribution1D::Sample Distribution1D::Draw(float u) const {
-  const auto above = std::upper_bound(cdf_.begin(), cdf_.end(), static_cast<double>(u));
-  int index = std::clamp(static_cast<int>(above - cdf_.begin()) - 1, 0, size() - 1);
+  int index = 0;
+  if (!begin_.empty()) index = static_cast<int>(begin_[static_cast<size_t>(u * static_cast<float>(begin_.size()))]);
+  while (index + 1 < size() && cdf_[index + 1] <= static_cast<double>(u)) ++index;
   // Cells whose probability is zero, or so small that single precision has no number for it, are not drawn.
   while (index > 0 && Probability(index) <= 0) --index;
   while (index + 1 < size() && Probability(index) <= 0) ++index;

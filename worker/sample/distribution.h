@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -26,6 +27,8 @@ class Distribution1D {
 
  private:
   std::vector<double> cdf_{0, 1};
+  // Where the search for u in [i, i + 1) / size begins: the last cell that begins at i / size or before. Empty for few.
+  std::vector<uint32_t> begin_;
   double total_ = 0;
 };
 

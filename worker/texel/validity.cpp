@@ -14,6 +14,7 @@ constexpr float kInsideShare = 0.9f;    // of back faces: the texel is inside as
 constexpr float kOutsideShare = 0.25f;  // of back faces: the texel is outside as a whole, if nothing divides it
 constexpr int kValidityFirstRays = 8;   // of a texel that something may divide
 constexpr int kCrowdRays = 8, kPlaceRays = 3, kInsideRays = 16, kPlaces = 16;
+constexpr int kSureRays = 4;  // that met nothing but back faces
 
 // Cosine-weighted rays from one place, and how many of them met a back face first.
 struct Backs {
@@ -35,10 +36,11 @@ float BackShare(const World& world, const SurfacePoint& from, const Frame& frame
   return seen.Share();
 }
 
-// Whether more than half of kInsideRays meet a back face: `seen` goes on until that is certain.
+// Whether more than half of kInsideRays meet a back face: `seen` goes on until that is certain, or as good as that.
 bool IsInside(const World& world, const SurfacePoint& from, const Frame& frame, const SobolSet& set, Backs& seen,
               int& rays) {
   while (2 * seen.backs <= kInsideRays && 2 * (seen.rays - seen.backs) < kInsideRays) {
+    if (seen.backs == seen.rays && seen.rays >= kSureRays) return true;
     AddRays(world, from, frame, set, seen.rays + 1, seen, rays);
   }
   return 2 * seen.backs > kInsideRays;

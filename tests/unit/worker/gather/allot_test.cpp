@@ -80,5 +80,18 @@ TEST(Allot, CostsLittleMoreThanTheOptimum) {
   EXPECT_LT(rounds, 20);
 }
 
+TEST(Allot, IsMetWhereNothingIsGranted) {
+  TestRandom random(5);
+  for (int turn = 0; turn < 1000; ++turn) {
+    std::vector<Claim> claims;
+    for (int i = 0; i < 20; ++i) {
+      claims.push_back({2.2f * random.Unit() * random.Unit(), 8, random.Unit() < 0.3f ? 0 : 3});
+      if (random.Unit() < 0.02f) claims.back().error = 9;
+    }
+    const std::vector<bool> granted = Allot(claims, 10);
+    EXPECT_EQ(IsMet(claims, 10), std::count(granted.begin(), granted.end(), true) == 0) << turn;
+  }
+}
+
 }  // namespace
 }  // namespace bakewell

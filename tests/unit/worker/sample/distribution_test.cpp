@@ -88,5 +88,22 @@ TEST(Distribution2D, DrawsInProportionToWeightsUniformlyInCells) {
   EXPECT_LT(ChiSquareOf(observed, expected).Z(), 4);
 }
 
+TEST(Distribution1D, ManyCellsAreFoundAsIfSearchedOneByOne) {
+  TestRandom random(3);
+  for (const size_t cells : {17, 64, 1000}) {
+    std::vector<float> weights;
+    for (size_t i = 0; i < cells; ++i) weights.push_back(std::pow(random.Unit(), 8.0f) * (i % 3 == 0 ? 0.0f : 1.0f));
+    const Distribution1D distribution(weights);
+    for (int k = 0; k < 4096; ++k) {
+      const float u = k == 4095 ? kLast : static_cast<float>(k) / 4096;
+      const auto sample = distribution.Draw(u);
+      double before = 0;
+      for (int i = 0; i < sample.index; ++i) before += static_cast<double>(distribution.Probability(i));
+      EXPECT_NEAR(before + static_cast<double>(sample.remainder * sample.probability), static_cast<double>(u), 1e-5);
+      EXPECT_GT(weights[static_cast<size_t>(sample.index)], 0);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace bakewell

@@ -100,5 +100,14 @@ TEST(Warp, TriangleIsUniform) {
   EXPECT_LT(ChiSquareOf(observed, expected).Z(), 4);
 }
 
+TEST(Circle, IsCosineAndSine) {
+  for (int i = 0; i <= 4096; ++i) {
+    const float turns = static_cast<float>(i) / 4096;
+    const Vec2f p = Circle(turns);
+    EXPECT_NEAR(static_cast<double>(p.x), std::cos(2 * kPi * static_cast<double>(turns)), 2e-7) << turns;
+    EXPECT_NEAR(static_cast<double>(p.y), std::sin(2 * kPi * static_cast<double>(turns)), 2e-7) << turns;
+  }
+}
+
 }  // namespace
 }  // namespace bakewell
