@@ -10,14 +10,11 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
-#include <numeric>
 #include <set>
 #include <stdexcept>
 
 #include "core/artifact/atomic_file.h"
-#include "core/image/rle.h"
 
 namespace bakewell {
 namespace {
@@ -28,10 +25,10 @@ constexpr int kLargestSide = 1 << 16;
 constexpr uint64_t kLargestRatio = 4096;
 constexpr uint64_t kSmallImageBytes = 1 << 20;
 
-// OpenEXR writes into memory.
+// OpenEXR writes into memory; the file itself is written atomically afterwards.
 class MemoryOut : public Imf::OStream {
  public:
-  MemoryOut() : Imf::OStream("memory") {}
+  explicit MemoryOut(size_t expected_bytes) : Imf::OStream("memory") { bytes_.reserve(expected_bytes); }
   void write(const char bytes[], int count) override {
     if (position_ > bytes_.size()) bytes_.resize(position_);
     bytes_.replace(position_, static_cast<size_t>(count), bytes, static_cast<size_t>(count));
@@ -80,46 +77,25 @@ Imf::Slice PlanarSlice(float* first, const Imath::Box2i& window) {
   return Imf::Slice::Make(Imf::FLOAT, first, window, sizeof(float));
 }
 
-// An EXR file up to its table of lines, which is all zeros: OpenEXR's own, of an image whose pixels never come.
-std::string EncodeHead(const Image& image) {
+std::string EncodeExr(const Image& image) {
   Imf::Header header(image.width, image.height);
   // Noise does not compress: ZIP makes pages 8 % smaller than RLE and takes six times as long, a tenth of a preview.
   header.compression() = Imf::RLE_COMPRESSION;
-  for (const std::string& name : image.channels) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
-  MemoryOut stream;
-  { const Imf::OutputFile file(stream, header, kThisThreadOnly); }
-  return std::move(stream).bytes();
-}
-
-static_assert(std::endian::native == std::endian::little);
-template <typename T>
-void Put(T value, size_t at, std::string& bytes) {
-  bytes.replace(at, sizeof(T), reinterpret_cast<const char*>(&value), sizeof(T));
-}
-
-std::string EncodeExr(const Image& image) {
-  std::string bytes = EncodeHead(image);
-  const auto width = static_cast<size_t>(image.width), height = static_cast<size_t>(image.height);
-  const size_t table = bytes.size() - height * sizeof(uint64_t);
-  bytes.reserve(bytes.size() + image.data.size() * sizeof(float) + height * 2 * sizeof(int32_t));
-  std::vector<int> order(image.channels.size());  // by name, as the header has them
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return image.channels[a] < image.channels[b]; });
-  std::vector<float> line(width * order.size());
-  RleLines lines;
-  for (size_t y = 0; y < height; ++y) {
-    auto end = line.begin();
-    for (const int c : order)
-      end = std::copy_n(image.Channel(c).begin() + static_cast<ptrdiff_t>(y * width), width, end);
-    // Where the line begins; its y and size, and the line.
-    const size_t at = bytes.size(), head = at + 2 * sizeof(int32_t);
-    Put(static_cast<uint64_t>(at), table + y * sizeof(uint64_t), bytes);
-    bytes.resize(head);
-    lines.Append({reinterpret_cast<const uint8_t*>(line.data()), line.size() * sizeof(float)}, bytes);
-    Put(static_cast<int32_t>(y), at, bytes);
-    Put(static_cast<int32_t>(bytes.size() - head), at + sizeof(int32_t), bytes);
+  Imf::FrameBuffer pixels;
+  for (size_t c = 0; c < image.channels.size(); ++c) {
+    header.channels().insert(image.channels[c], Imf::Channel(Imf::FLOAT));
+    float* const first = const_cast<float*>(image.Channel(static_cast<int>(c)).data());
+    pixels.insert(image.channels[c], PlanarSlice(first, header.dataWindow()));
   }
-  return bytes;
+  // Lines that would grow are stored as they are.
+  constexpr size_t kHeadBytes = 4096, kLineBytes = 16;
+  MemoryOut stream(image.data.size() * sizeof(float) + kHeadBytes + kLineBytes * static_cast<size_t>(image.height));
+  {
+    Imf::OutputFile file(stream, header, kThisThreadOnly);
+    file.setFrameBuffer(pixels);
+    file.writePixels(image.height);
+  }
+  return std::move(stream).bytes();
 }
 
 // Throws where the header claims what we do not read or what the file cannot hold; else an image of that shape.
