@@ -10,16 +10,6 @@
 namespace bakewell {
 namespace {
 
-void Add(const GatherCounters& from, GatherCounters& to) {
-  to.gather_rays += from.gather_rays;
-  to.shadow_rays += from.shadow_rays;
-  to.bounce_rays += from.bounce_rays;
-  to.validity_rays += from.validity_rays;
-  to.filter_rays += from.filter_rays;
-  to.bad_samples += from.bad_samples;
-  to.skip.Add(from.skip);
-}
-
 struct Photons {
   SurfaceCells cells;
   RadianceCache cache;
@@ -87,7 +77,7 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
     std::copy(lights.begin(), lights.end(), baked.lights.begin() + prepared.texels.tile_begin[tile]);
     progress.Report("gather", ++done, tiles);
     const std::lock_guard<std::mutex> lock(mutex);
-    Add(counters, baked.counters);
+    baked.counters.Add(counters);
   });
   clock.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");

@@ -103,6 +103,7 @@ absl::StatusOr<std::string> PngBytes(int width, int height, std::span<const uint
   image.width = static_cast<png_uint_32>(width);
   image.height = static_cast<png_uint_32>(height);
   image.format = PNG_FORMAT_RGB;
+  image.flags = PNG_IMAGE_FLAG_FAST;  // a third larger, half the time
   png_alloc_size_t size_bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string bytes(size_bytes, '\0');
   const int as_is = 0;

@@ -206,7 +206,10 @@ float SmoothGrid::PooledVariance(int x, int y) const {
 // A window that grows ring by ring.
 class SmoothGrid::Growth {
  public:
-  Growth(const SmoothGrid& grid, int x, int y) : grid_(grid), x_(x), y_(y), part_(grid.At(x, y).part) { Add(0, 0); }
+  Growth(const SmoothGrid& grid, int x, int y)
+      : grid_(grid), x_(x), y_(y), center_(&grid.At(x, y)), part_(center_->part) {
+    Add(0, 0);
+  }
 
   int radius() const { return radius_; }
   const Moments& known() const { return known_; }  // texels with a value
@@ -242,6 +245,7 @@ class SmoothGrid::Growth {
   bool Grow() {
     const int r = ++radius_;
     if (r <= grid_.At(x_, y_).room) return AddRing();
+    fits_ = x_ >= r && y_ >= r && x_ + r < grid_.width() && y_ + r < grid_.height();
     int joined = 0, left = 0;
     // There and back again, so that texels of the ring that are reached along it join too.
     const std::span<const RingStep> ring = kRings.Ring(r);
@@ -253,14 +257,20 @@ class SmoothGrid::Growth {
 
  private:
   void Try(const RingStep& step, int& joined, int& left) {
-    const int x = x_ + step.dx, y = y_ + step.dy;
-    if (!grid_.Contains(x, y)) return;
-    const SmoothCell& cell = grid_.At(x, y);
+    if (!fits_ && !grid_.Contains(x_ + step.dx, y_ + step.dy)) return;
+    const SmoothCell& cell = center_[step.dy * grid_.width() + step.dx];
     if (cell.part != part_ || cell.open == 0) return;
     bool& inside = inside_[Window::Index(step.dx, step.dy)];
     if (inside) return;
     // Towards the centre first: on a plain surface that is all there is to ask.
-    for (size_t turn = 0; turn < kNeighbours.size(); ++turn) {
+    const std::array<int, 2> in = kNeighbours[step.inward];
+    if (cell.open >> step.inward & 1 && Has(step.dx + in[0], step.dy + in[1])) {
+      inside = true;
+      Add(step.dx, step.dy);
+      ++joined;
+      return;
+    }
+    for (size_t turn = 1; turn < kNeighbours.size(); ++turn) {
       const size_t k = (step.inward + turn) % kNeighbours.size();
       if (!(cell.open >> k & 1)) continue;
       const int ix = step.dx + kNeighbours[k][0], iy = step.dy + kNeighbours[k][1];
@@ -321,7 +331,7 @@ class SmoothGrid::Growth {
 
   void Add(int dx, int dy) {
     all_.Add(dx, dy, 1);
-    const SmoothCell& cell = grid_.At(x_ + dx, y_ + dy);
+    const SmoothCell& cell = center_[dy * grid_.width() + dx];
     if (!cell.known) return;
     known_.Add(dx, dy, 1);
     const double value = static_cast<double>(cell.value);
@@ -334,7 +344,9 @@ class SmoothGrid::Growth {
 
   const SmoothGrid& grid_;
   const int x_, y_;
+  const SmoothCell* const center_;
   const uint8_t part_;
+  bool fits_ = false;                   // the ring lies on the grid
   int radius_ = 0, square_radius_ = 0;  // up to square_radius_ everything is inside
   Moments known_, all_;
   double value_ = 0, square_ = 0, value_x_ = 0, value_y_ = 0, variance_ = 0;

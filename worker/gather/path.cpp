@@ -29,6 +29,17 @@ Rgb Arriving(const GatherScene& scene, const SurfacePoint& point, const LightSam
 
 }  // namespace
 
+void GatherCounters::Add(const GatherCounters& other) {
+  gather_rays += other.gather_rays;
+  shadow_rays += other.shadow_rays;
+  bounce_rays += other.bounce_rays;
+  validity_rays += other.validity_rays;
+  filter_rays += other.filter_rays;
+  bad_samples += other.bad_samples;
+  distant_found += other.distant_found;
+  skip.Add(other.skip);
+}
+
 Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters) {
   Rgb irradiance;
   if (!scene.tree.empty()) {

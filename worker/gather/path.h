@@ -27,6 +27,7 @@ struct GatherCounters {
   int64_t distant_found = 0;  // samples of suns and sky that arrived; reported to nobody
   SkipTally skip;
   int64_t light_rays() const { return gather_rays + shadow_rays + bounce_rays; }
+  void Add(const GatherCounters& other);
 };
 
 // Light that one gather ray brings back.

@@ -216,13 +216,7 @@ std::string SerializeTiles(std::span<const GatheredTiles> parts) {
   size_t texels = 0;
   for (const auto& [lights, counters] : parts) {
     texels += lights.size();
-    all.gather_rays += counters.gather_rays;
-    all.shadow_rays += counters.shadow_rays;
-    all.bounce_rays += counters.bounce_rays;
-    all.validity_rays += counters.validity_rays;
-    all.filter_rays += counters.filter_rays;
-    all.bad_samples += counters.bad_samples;
-    all.skip.Add(counters.skip);
+    all.Add(counters);
   }
   NumberWriter writer(kHeadBytes + kTexelBytes * texels);
   for (const int64_t value :

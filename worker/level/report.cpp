@@ -58,15 +58,7 @@ absl::StatusOr<BakeTally> BakeTally::Parse(std::string_view bytes) {
   return tally;
 }
 
-void BakeTally::Count(const GatherCounters& counters) {
-  counters_.gather_rays += counters.gather_rays;
-  counters_.shadow_rays += counters.shadow_rays;
-  counters_.bounce_rays += counters.bounce_rays;
-  counters_.validity_rays += counters.validity_rays;
-  counters_.filter_rays += counters.filter_rays;
-  counters_.bad_samples += counters.bad_samples;
-  counters_.skip.Add(counters.skip);
-}
+void BakeTally::Count(const GatherCounters& counters) { counters_.Add(counters); }
 
 void BakeTally::Count(std::span<const TexelLight> lights, const FilterCounters& filter) {
   filtered_ += filter.filtered;
