@@ -1,5 +1,8 @@
 #include "worker/finish/page.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 
@@ -119,19 +122,23 @@ PageImages FinishPage(const TexelMap& map, std::span<const TexelLight> lights, i
                     Image(size.width, size.height, {"R", "G", "B", "A"})};
   Filler filler(LightPlanes(images), size);
   const std::vector<int32_t>& texel_at = map.texel_at[page];
-  TexelBatch batch;
-  for (size_t at = 0; at < texel_at.size(); ++at) {
-    if (texel_at[at] < 0) continue;
-    const auto i = static_cast<size_t>(texel_at[at]);
-    if (lights[i].valid) filler.MarkKnown(at);
-    batch.at[batch.count] = at;
-    batch.texel[batch.count] = &map.texels[i];
-    batch.light[batch.count++] = &lights[i];
-    if (batch.count < kRingingLanes) continue;
-    PutTexels(batch, images);
-    batch.count = 0;
-  }
-  PutTexels(batch, images);
+  constexpr size_t kGrain = 4096;  // places on the page
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, texel_at.size(), kGrain),
+                    [&](const tbb::blocked_range<size_t>& some) {
+                      TexelBatch batch;
+                      for (size_t at = some.begin(); at < some.end(); ++at) {
+                        if (texel_at[at] < 0) continue;
+                        const auto i = static_cast<size_t>(texel_at[at]);
+                        if (lights[i].valid) filler.MarkKnown(at);
+                        batch.at[batch.count] = at;
+                        batch.texel[batch.count] = &map.texels[i];
+                        batch.light[batch.count++] = &lights[i];
+                        if (batch.count < kRingingLanes) continue;
+                        PutTexels(batch, images);
+                        batch.count = 0;
+                      }
+                      PutTexels(batch, images);
+                    });
   const auto covered = [&](size_t at) { return texel_at[at] >= 0; };
   const auto same_chart = [&](size_t at, size_t neighbour) {
     return covered(neighbour) && map.texels[texel_at[at]].chart == map.texels[texel_at[neighbour]].chart;

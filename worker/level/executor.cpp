@@ -293,7 +293,9 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
     tally.Count(Skip::kShBands, dropped);
   }
   tally.Count(std::span(lights).first(gathered), filtered);
-  BAKEWELL_ASSIGN_OR_RETURN(MadeOutputs outputs, PageFiles(*texels, lights, page));
+  absl::StatusOr<MadeOutputs> files;
+  InArena([&] { files = PageFiles(*texels, lights, page); });
+  BAKEWELL_ASSIGN_OR_RETURN(MadeOutputs outputs, std::move(files));
   outputs.push_back({"tally", tally.Serialize()});
   Say("finish", ++pages_done_, pages);
   return outputs;

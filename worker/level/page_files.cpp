@@ -1,6 +1,7 @@
 #include "worker/level/page_files.h"
 
 #include <absl/strings/str_cat.h>
+#include <tbb/parallel_invoke.h>
 
 #include "core/image/exr.h"
 #include "core/image/png.h"
@@ -11,19 +12,21 @@ namespace bakewell {
 absl::StatusOr<MadeOutputs> PageFiles(const TexelMap& map, std::span<const TexelLight> lights, int page) {
   if (page < 0 || page >= static_cast<int>(map.pages.size())) return absl::InvalidArgumentError("no such page");
   const PageImages images = FinishPage(map, lights, page);
-  const Image& irradiance = images.irradiance;
+  const Image& seen = images.irradiance;
+  absl::StatusOr<std::string> irradiance, preview, sh, variance;
+  std::string charts;
+  tbb::parallel_invoke([&] { sh = ExrBytes(images.sh); },  // most of the work
+                       [&] { irradiance = ExrBytes(seen); }, [&] { variance = ExrBytes(images.variance); },
+                       [&] { preview = PngBytes(seen.width, seen.height, TonemapPreview(seen)); },
+                       [&] { charts = ChartsJson(page, SummarizeCharts(map, lights, page)); });
+  for (const auto* encoded : {&irradiance, &preview, &sh, &variance}) BAKEWELL_RETURN_IF_ERROR(encoded->status());
   const std::string stem = absl::StrCat("lightmap-", page);
-  MadeOutputs outputs(5);
-  outputs[0].name = stem + ".irradiance.exr";
-  BAKEWELL_ASSIGN_OR_RETURN(outputs[0].bytes, ExrBytes(irradiance));
-  outputs[1].name = stem + ".png";
-  BAKEWELL_ASSIGN_OR_RETURN(outputs[1].bytes,
-                            PngBytes(irradiance.width, irradiance.height, TonemapPreview(irradiance)));
-  outputs[2].name = stem + ".sh.exr";
-  BAKEWELL_ASSIGN_OR_RETURN(outputs[2].bytes, ExrBytes(images.sh));
-  outputs[3].name = stem + ".variance.exr";
-  BAKEWELL_ASSIGN_OR_RETURN(outputs[3].bytes, ExrBytes(images.variance));
-  outputs[4] = {stem + ".charts.json", ChartsJson(page, SummarizeCharts(map, lights, page))};
+  MadeOutputs outputs;
+  outputs.push_back({stem + ".irradiance.exr", *std::move(irradiance)});
+  outputs.push_back({stem + ".png", *std::move(preview)});
+  outputs.push_back({stem + ".sh.exr", *std::move(sh)});
+  outputs.push_back({stem + ".variance.exr", *std::move(variance)});
+  outputs.push_back({stem + ".charts.json", std::move(charts)});
   return outputs;
 }
 

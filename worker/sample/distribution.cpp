@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 #include "core/base/check.h"
 
@@ -15,10 +16,10 @@ Distribution1D::Distribution1D(std::span<const float> weights) : cdf_(weights.si
     cdf_[i] = total_ > 0 ? cdf_[i] / total_ : static_cast<double>(i) / static_cast<double>(weights.size());
   }
   cdf_.back() = 1;
-  constexpr size_t kFew = 16, kPerStart = 4;
-  if (weights.size() <= kFew) return;
+  constexpr size_t kFew = 16, kPerStart = 8;
+  if (weights.size() <= kFew || weights.size() > std::numeric_limits<uint16_t>::max()) return;
   begin_.resize(std::bit_floor(weights.size() / kPerStart));  // u times a power of two is exact
-  uint32_t cell = 0;
+  uint16_t cell = 0;
   for (size_t i = 0; i < begin_.size(); ++i) {
     while (cdf_[cell + 1] <= static_cast<double>(i) / static_cast<double>(begin_.size())) ++cell;
     begin_[i] = cell;
@@ -27,7 +28,12 @@ Distribution1D::Distribution1D(std::span<const float> weights) : cdf_(weights.si
 
 Distribution1D::Sample Distribution1D::Draw(float u) const {
   int index = 0;
-  if (!begin_.empty()) index = static_cast<int>(begin_[static_cast<size_t>(u * static_cast<float>(begin_.size()))]);
+  if (begin_.empty()) {
+    const auto above = std::upper_bound(cdf_.begin(), cdf_.end() - 1, static_cast<double>(u));
+    index = std::max(0, static_cast<int>(above - cdf_.begin()) - 1);
+  } else {
+    index = begin_[static_cast<size_t>(u * static_cast<float>(begin_.size()))];
+  }
   while (index + 1 < size() && cdf_[index + 1] <= static_cast<double>(u)) ++index;
   // Cells whose probability is zero, or so small that single precision has no number for it, are not drawn.
   while (index > 0 && Probability(index) <= 0) --index;

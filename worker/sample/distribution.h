@@ -27,8 +27,9 @@ class Distribution1D {
 
  private:
   std::vector<double> cdf_{0, 1};
-  // Where the search for u in [i, i + 1) / size begins: the last cell that begins at i / size or before. Empty for few.
-  std::vector<uint32_t> begin_;
+  // Where the search for u in [i, i + 1) / size begins: the last cell that begins at i / size or before. Empty for few,
+  // and for more than it can tell.
+  std::vector<uint16_t> begin_;
   double total_ = 0;
 };
 
