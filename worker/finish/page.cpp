@@ -65,7 +65,8 @@ class Filler {
  private:
   template <typename Accept>
   bool FillOne(size_t at, Accept accept) {
-    const int x = static_cast<int>(at % static_cast<size_t>(width_)), y = static_cast<int>(at) / width_;
+    const int x = static_cast<int>(at % static_cast<size_t>(width_)),
+              y = static_cast<int>(at / static_cast<size_t>(width_));
     std::array<size_t, 8> from;
     size_t count = 0;
     for (int ny = std::max(0, y - 1); ny <= std::min(height_ - 1, y + 1); ++ny) {

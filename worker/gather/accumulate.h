@@ -21,8 +21,8 @@ class Accumulator {
  public:
   // A sample whose point was valid, whatever it found.
   void Count() { count_ += 1; }
-  // Sample `index` of `planned` in all (a multiple of kBlocks) found this irradiance. Samples come in order; the run
-  // ends with its block.
+  // Sample `index` of `planned` in all (a multiple of kBlocks) found this irradiance. Samples come in order; a
+  // run's irradiance ends with its block.
   void AddIrradiance(uint32_t index, uint32_t planned, Rgb irradiance) {
     planned_ = planned;
     const size_t block =

@@ -42,9 +42,10 @@ inline int ColumnOf(float x, float y) {
   return y >= 0 ? upper : lower;
 }
 
+// A z that is no number counts as 0.
 inline int CellAlong(float x, float y, float z) {
-  const int row = std::min(static_cast<int>(GatherRow(z) * static_cast<float>(kRows)), kRows - 1);
-  return row * kColumns + ColumnOf(x, y);
+  const float row = std::min(std::max(0.0f, GatherRow(z) * static_cast<float>(kRows)), static_cast<float>(kRows - 1));
+  return static_cast<int>(row) * kColumns + ColumnOf(x, y);
 }
 
 }  // namespace

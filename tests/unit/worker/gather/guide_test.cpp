@@ -107,5 +107,20 @@ TEST(FoundLight, GuidesNobodyWhereAllDirectionsAreAlike) {
   EXPECT_FALSE(nothing.GuideAt({}, kUp).has_value());
 }
 
+// Light so far away that the distance is beyond what floats hold: its direction is no number, and no cell.
+TEST(FoundLight, DirectionsThatAreNoNumbersStayInTheTable) {
+  FoundLight found;
+  for (int i = 0; i < 64; ++i) found.Add({3e38f, 3e38f, 3e38f}, false, 1);
+  found.Resample(64, 0.5f);
+  const float s = 1 / std::sqrt(3.0f), r = 1 / std::sqrt(2.0f);
+  const Frame diagonal{{r, -r, 0}, {s * r, s * r, -2 * s * r}, {s, s, s}};
+  if (const auto guide = found.GuideAt({0, 0, 0}, diagonal)) {
+    const GatherGuide::Sample sample = guide->Draw({0.5f, 0.5f});
+    EXPECT_TRUE(std::isfinite(sample.density));
+    EXPECT_GT(sample.density, 0);
+  }
+  EXPECT_LT(GatherGuide::CellOf({0, 0, std::nanf("")}), size_t{GatherGuide::kCells});
+}
+
 }  // namespace
 }  // namespace bakewell
