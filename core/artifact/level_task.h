@@ -28,8 +28,8 @@ inline constexpr KindName kChart{"chart/layout", 2};
 inline constexpr KindName kSurvey{"texel/survey", 6};
 inline constexpr KindName kEmit{"photon/emit", 6};
 inline constexpr KindName kDensity{"photon/density", 5};
-inline constexpr KindName kGather{"gather/tiles", 14};
-inline constexpr KindName kFinish{"finish/page", 11};
+inline constexpr KindName kGather{"gather/tiles", 15};
+inline constexpr KindName kFinish{"finish/page", 12};
 inline constexpr KindName kReport{"finish/report", 4};
 inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};
 

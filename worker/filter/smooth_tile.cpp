@@ -71,10 +71,11 @@ void SmoothTile::ForEachKnown(Visit visit) {
 
 std::vector<SmoothGrid::Smoothed> SmoothTile::Smooth() {
   std::vector<SmoothGrid::Smoothed> result(end_ - begin_);
-  ForEachKnown([&](size_t i, int x, int y) { result[i].variance = grid_.NoiseVariance(x, y); });
-  ForEachKnown([&](size_t i, int, int) { CellOf(i).variance = result[i].variance; });
+  std::vector<SmoothGrid::Calm> calm(result.size());
+  ForEachKnown([&](size_t i, int x, int y) { calm[i] = grid_.Calmed(x, y); });
+  ForEachKnown([&](size_t i, int x, int y) { grid_.Take(x, y, calm[i]); });
   std::vector<SmoothGrid::Steps> steps(result.size());
-  ForEachKnown([&](size_t i, int x, int y) { grid_.Choose(x, y, &steps[i]); });
+  ForEachKnown([&](size_t i, int x, int y) { CellOf(i).radius = grid_.Choose(x, y, &steps[i]); });
   ForEachKnown([&](size_t i, int x, int y) { result[i] = grid_.SmoothedAt(x, y, grid_.Agree(x, y), steps[i]); });
   return result;
 }

@@ -5,6 +5,8 @@
 #include <limits>
 #include <span>
 
+#include "worker/filter/regression.h"
+
 namespace bakewell {
 namespace {
 
@@ -13,54 +15,15 @@ constexpr double kConfidence = 0.5;                   // half width of a confide
 constexpr float kMostOverOwn = 4;                     // times a texel's own variance that its neighbours may make of it
 constexpr int kStrayRadius = 2;                       // of the window whose strays say how large the noise is
 constexpr double kLeastStrays = 9;                    // texels in it
-constexpr float kStraysByNoise = 4, kStraysMost = 8;  // standard errors; from there on it is no noise
-constexpr double kRidge = 1e-3;  // holds slopes back, so that texels in one line or one corner give an answer too
+constexpr float kStraysByNoise = 4, kStraysMost = 8;  // standard errors; from there on it is a detail
+constexpr float kNoiseStray = 2, kAdmittedStray = 3;  // likewise, of a texel's neighbours and its own: it is a stray
+constexpr size_t kLeastVotes = 4;                     // neighbours that say whether it is
 
-// Sums over a window's texels for a first-order regression over their offsets x, y [texels].
-struct Moments {
-  int n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-  void Add(int dx, int dy, int count) {
-    n += count;
-    x += count * dx;
-    y += count * dy;
-    xx += count * dx * dx;
-    xy += count * dx * dy;
-    yy += count * dy * dy;
-  }
-  // The 8 r texels at Chebyshev distance r.
-  void AddRing(int r) {
-    const int squares = 2 * r * (r + 1) * (2 * r + 1) / 3 + 2 * (2 * r - 1) * r * r;
-    n += 8 * r;
-    xx += squares;
-    yy += squares;
-  }
-};
-
-// The regression's value at the window's centre is the sum of the values with weights constant + x dx + y dy.
-struct Weights {
-  double constant, x, y;
-
-  // First row of the inverse of the normal equations.
-  explicit Weights(const Moments& m) {
-    if (m.x == 0 && m.y == 0) {
-      constant = 1.0 / m.n;
-      x = y = 0;
-      return;
-    }
-    const double xx = m.xx + kRidge * m.n, yy = m.yy + kRidge * m.n, xy = m.xy;
-    const double c0 = xx * yy - xy * xy, c1 = xy * m.y - m.x * yy, c2 = m.x * xy - xx * m.y;
-    const double det = m.n * c0 + m.x * c1 + m.y * c2;
-    constant = c0 / det;
-    x = c1 / det;
-    y = c2 / det;
-  }
-  double At(int dx, int dy) const { return constant + x * dx + y * dy; }
-  // Sum of the squared weights.
-  double Square(const Moments& m) const {
-    return constant * constant * m.n + x * x * m.xx + y * y * m.yy +
-           2 * (constant * x * m.x + constant * y * m.y + x * y * m.xy);
-  }
-};
+float MedianOf(std::array<float, kNeighbours.size()> values, size_t count) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
+  return *middle;
+}
 
 // One texel of a ring around a window: its offset, and which of kNeighbours lies towards the centre.
 struct RingStep {
@@ -187,12 +150,12 @@ class SmoothGrid::Growth {
   }
 
   int radius() const { return radius_; }
-  const Moments& known() const { return known_; }  // texels with a value
-  const Moments& all() const { return all_; }
+  const RegressionMoments& known() const { return known_; }  // texels with a value
+  const RegressionMoments& all() const { return all_; }
   double mean_variance() const { return variance_ / known_.n; }
   // Mean square distance of the values from the plane that fits them best, without what the fit takes off.
   double Stray() const {
-    const Moments& m = known_;
+    const RegressionMoments& m = known_;
     if (m.n < kLeastStrays) return kInfinity;
     // Values are counted from their mean.
     const double n = m.n, mean = value_ / n, vx = value_x_ - mean * m.x, vy = value_y_ - mean * m.y;
@@ -207,20 +170,12 @@ class SmoothGrid::Growth {
     return std::max(std::abs(dx), std::abs(dy)) <= square_radius_ || inside_[Window::Index(dx, dy)];
   }
 
-  // How far the centre is from what the others say of it, in standard errors of that; 0 where they say nothing.
-  float StrayOfCenter(const Weights& w, double estimate) const {
-    const double others = 1 - w.constant;  // the variance of the difference from the estimate, over that of a texel
-    if (others < 1e-3 || !center_->known) return 0;
-    return static_cast<float>(std::abs(static_cast<double>(center_->value) - estimate) /
-                              std::sqrt(others * mean_variance()));
-  }
-
   // The regression's value at the centre.
-  double Estimate(const Weights& w) const { return w.constant * value_ + w.x * value_x_ + w.y * value_y_; }
-  double Variance(const Weights& w) const { return w.Square(known_) * mean_variance(); }
+  double Estimate(const RegressionWeights& w) const { return w.constant * value_ + w.x * value_x_ + w.y * value_y_; }
+  double Variance(const RegressionWeights& w) const { return w.Square(known_) * mean_variance(); }
 
-  Smoothed Result(const Weights& weights, double estimate) const {
-    const double square = known_.n == all_.n ? weights.Square(known_) : Weights(all_).Square(all_);
+  Smoothed Result(const RegressionWeights& weights, double estimate) const {
+    const double square = known_.n == all_.n ? weights.Square(known_) : RegressionWeights(all_).Square(all_);
     return {static_cast<float>(estimate), static_cast<float>(square * mean_variance()), static_cast<float>(square)};
   }
 
@@ -331,7 +286,7 @@ class SmoothGrid::Growth {
   const uint8_t part_;
   bool fits_ = false;                   // the ring lies on the grid
   int radius_ = 0, square_radius_ = 0;  // up to square_radius_ everything is inside
-  Moments known_, all_;
+  RegressionMoments known_, all_;
   double value_ = 0, square_ = 0, value_x_ = 0, value_y_ = 0, variance_ = 0;
   std::array<bool, (2 * kMostRadius + 1) * (2 * kMostRadius + 1)> inside_{};
 };
@@ -345,21 +300,53 @@ float SmoothGrid::NoiseVariance(int x, int y) const {
   return std::min(pooled, static_cast<float>(window.Stray()));
 }
 
-void SmoothGrid::Choose(int x, int y, Steps* steps) {
-  SmoothCell& cell = At(x, y);
-  cell.radius = Grown(x, y, steps, cell.stray);
+SmoothGrid::Calm SmoothGrid::Calmed(int x, int y) const {
+  const SmoothCell& cell = At(x, y);
+  Calm calm{cell.value, NoiseVariance(x, y), 0};
+  std::array<float, kNeighbours.size()> values, variances;
+  size_t count = 0;
+  float value_sum = 0, variance_sum = 0;
+  for (size_t k = 0; k < kNeighbours.size(); ++k) {
+    if (!(cell.open >> k & 1)) continue;
+    const SmoothCell& other = At(x + kNeighbours[k][0], y + kNeighbours[k][1]);
+    if (!other.known) continue;
+    values[count] = other.value;
+    variances[count++] = other.variance;
+    value_sum += other.value;
+    variance_sum += other.variance;
+  }
+  if (count == 0) return calm;
+  const auto n = static_cast<float>(count);
+  const float of_all = std::sqrt((variance_sum + cell.variance) / n);  // of the difference from the neighbours' mean
+  if (of_all > 0) calm.stray = std::fabs(cell.value - value_sum / n) / of_all;
+  if (count < kLeastVotes) return calm;
+  const float value = MedianOf(values, count), variance = MedianOf(variances, count);
+  const float off = std::fabs(cell.value - value);
+  const float share = std::clamp(kAdmittedStray + 1 - off / std::sqrt(cell.variance), 0.0f, 1.0f) *
+                      std::clamp(off / std::sqrt(variance) / kNoiseStray - 1, 0.0f, 1.0f);
+  if (share > 0) {
+    calm.value += share * (value - calm.value);
+    calm.variance += share * (variance - calm.variance);
+  }
+  return calm;
 }
 
-float SmoothGrid::Grown(int x, int y, Steps* steps, float& stray) const {
+void SmoothGrid::Take(int x, int y, const Calm& calm) {
+  SmoothCell& cell = At(x, y);
+  cell.value = calm.value;
+  cell.variance = calm.variance;
+  cell.stray = calm.stray;
+}
+
+float SmoothGrid::Choose(int x, int y, Steps* steps) const {
   Growth window(*this, x, y);
   double low = -kInfinity, high = kInfinity, overlap = 0, variance = kInfinity;
   for (int radius = 0;; ++radius) {
-    const Weights weights(window.known());
+    const RegressionWeights weights(window.known());
     const double estimate = window.Estimate(weights);
     // A window that takes in noisier texels must not widen its interval: quiet texels keep away from them.
     variance = std::min(variance, window.Variance(weights));
     const double reach = kConfidence * std::sqrt(variance);
-    if (radius == 1) stray = window.StrayOfCenter(weights, estimate);
     if (steps != nullptr) (*steps)[static_cast<size_t>(radius)] = window.Result(weights, estimate);
     low = std::max(low, estimate - reach);
     high = std::min(high, estimate + reach);
@@ -404,7 +391,7 @@ SmoothGrid::Window SmoothGrid::WindowOf(int x, int y, float radius) const {
 }
 
 void SmoothGrid::AddWeights(const Growth& growth, int x, int y, float share, Window& window) const {
-  const Weights weights(growth.known());
+  const RegressionWeights weights(growth.known());
   window.radius = growth.radius();
   for (int dy = -window.radius; dy <= window.radius; ++dy) {
     for (int dx = -window.radius; dx <= window.radius; ++dx) {
@@ -419,7 +406,7 @@ SmoothGrid::Smoothed SmoothGrid::SmoothedAt(int x, int y, float radius, Steps& s
   if (steps[whole].variance < 0 || steps[next].variance < 0) {
     Growth growth(*this, x, y);
     for (size_t r = 0; r <= next; ++r) {
-      const Weights weights(growth.known());
+      const RegressionWeights weights(growth.known());
       steps[r] = growth.Result(weights, growth.Estimate(weights));
       if (r < next) growth.Grow();
     }

@@ -20,7 +20,7 @@ struct SmoothCell {
   uint8_t part = 0;    // connected texels have the same, most others do not
   bool known = false;  // value and variance are there
   float radius = 0;    // of the window that it would choose by itself
-  float stray = 0;     // how far its value is from what its neighbours say of it, in standard errors
+  float stray = 0;     // SmoothGrid::Calm
 };
 
 // A rectangle of texels with a noisy signal, and how far around each texel it may be averaged.
@@ -53,6 +53,18 @@ class SmoothGrid {
   // overstate the error of the whole; texels' sets are independent, so that their strays do not.
   float NoiseVariance(int x, int y) const;
 
+  // A known texel as windows are to be chosen by.
+  struct Calm {
+    float value = 0, variance = 0;
+    float stray = 0;  // how far the value is from the neighbours' mean, in standard errors of that by all their blocks
+  };
+  // Its value with NoiseVariance; but the medians of its connected neighbours where it strays from them by far more
+  // than their noise, and by no more than its own variance admits. One such stray would otherwise keep all windows
+  // around it from growing, and itself from being averaged.
+  Calm Calmed(int x, int y) const;
+  // Once all are known: puts it in the texel's place.
+  void Take(int x, int y, const Calm& calm);
+
   // The estimate of a window, and the variance that it will have once texels that are not known yet are as well known
   // as the others.
   struct Smoothed {
@@ -61,12 +73,12 @@ class SmoothGrid {
   };
   using Steps = std::array<Smoothed, kMostRadius + 1>;
   // The radius of the largest window whose estimate agrees with those of all smaller ones, between two whole ones where
-  // the intervals part: it is continuous in the values. On the way there, the estimates by radius. It goes into the
-  // texel's `radius`, with its `stray`.
-  void Choose(int x, int y, Steps* steps = nullptr);
+  // the intervals part: it is continuous in the values. On the way there, the estimates by radius.
+  float Choose(int x, int y, Steps* steps = nullptr) const;
 
-  // The median of the radii of a texel and its neighbours: a texel that strays by more than its interval, as some must,
-  // would otherwise keep to itself. One that strays farther than noise does keeps to itself: it is a detail.
+  // The median of the radii of a texel and its neighbours (SmoothCell::radius): a texel that strays by more than its
+  // interval, as some must, would otherwise keep to itself. One that strays farther than noise does (SmoothCell::stray)
+  // keeps to itself: it is a detail.
   float Agree(int x, int y) const;
 
   // What a window of `radius` gives; fills in the steps that it needs.
@@ -89,7 +101,6 @@ class SmoothGrid {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
   class Growth;
-  float Grown(int x, int y, Steps* steps, float& stray) const;
   void NumberParts();
   float PooledVariance(int x, int y) const;
   void AddWeights(const Growth& growth, int x, int y, float share, Window& window) const;

@@ -25,11 +25,12 @@ class PageFilter {
   void Run(FilterCounters& counters) {
     for (const uint32_t i : texels_) Put(i);
     grid_.MeasureRoom();
-    std::vector<float> pooled(texels_.size());
-    ForEach([&](size_t k, const Texel& texel) { pooled[k] = grid_.NoiseVariance(texel.x, texel.y); });
-    ForEach([&](size_t k, const Texel& texel) { grid_.At(texel.x, texel.y).variance = pooled[k]; });
+    std::vector<SmoothGrid::Calm> calm(texels_.size());
+    ForEach([&](size_t k, const Texel& texel) { calm[k] = grid_.Calmed(texel.x, texel.y); });
+    ForEach([&](size_t k, const Texel& texel) { grid_.Take(texel.x, texel.y, calm[k]); });
     ForEach([&](size_t, const Texel& texel) {
-      if (grid_.At(texel.x, texel.y).known) grid_.Choose(texel.x, texel.y);
+      SmoothCell& cell = grid_.At(texel.x, texel.y);
+      if (cell.known) cell.radius = grid_.Choose(texel.x, texel.y);
     });
     std::vector<LightPart> smooth(texels_.size());
     std::vector<uint8_t> changed(texels_.size(), 0);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <vector>
 
 #include "tests/support/statistics.h"
 
@@ -39,16 +40,21 @@ class Page {
     float sum = 0;
     for (int dy = -window.radius; dy <= window.radius; ++dy) {
       for (int dx = -window.radius; dx <= window.radius; ++dx) {
-        if (window.At(dx, dy) != 0) sum += window.At(dx, dy) * grid_.At(x + dx, y + dy).value;
+        if (window.At(dx, dy) != 0) sum += window.At(dx, dy) * value_[Place(x + dx, y + dy)];
       }
     }
     return sum;
   }
 
+  // As the filters do.
   void Choose() {
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) grid_.Choose(x, y);
-    }
+    std::vector<SmoothGrid::Calm> calm(value_.size());
+    ForEach([&](int x, int y) {
+      value_[Place(x, y)] = grid_.At(x, y).value;
+      calm[Place(x, y)] = grid_.Calmed(x, y);
+    });
+    ForEach([&](int x, int y) { grid_.Take(x, y, calm[Place(x, y)]); });
+    ForEach([&](int x, int y) { grid_.At(x, y).radius = grid_.Choose(x, y); });
   }
 
   // Root mean square error after filtering over that before.
@@ -65,9 +71,17 @@ class Page {
   }
 
  private:
+  static size_t Place(int x, int y) { return static_cast<size_t>(y * kSide + x); }
+  static void ForEach(const std::function<void(int, int)>& visit) {
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) visit(x, y);
+    }
+  }
+
   std::function<float(int, int)> signal_;
   float deviation_;
   SmoothGrid grid_;
+  std::vector<float> value_ = std::vector<float>(kSide * kSide);  // before they were calmed
 };
 
 TEST(SmoothGrid, ASlopeIsKeptAndItsNoiseGoes) {
@@ -154,10 +168,7 @@ TEST(SmoothGrid, SquareWindowsAreWhatTheSearchFinds) {
       const auto sa = searched.SmoothedAt(x, y, 6.5f, steps_a), sb = measured.SmoothedAt(x, y, 6.5f, steps_b);
       EXPECT_NEAR(sa.value, sb.value, 1e-6f);
       EXPECT_NEAR(sa.variance, sb.variance, 1e-6f);
-      searched.Choose(x, y);
-      measured.Choose(x, y);
-      EXPECT_NEAR(searched.At(x, y).radius, measured.At(x, y).radius, 1e-4f);
-      EXPECT_NEAR(searched.At(x, y).stray, measured.At(x, y).stray, 1e-3f * (1 + searched.At(x, y).stray));
+      EXPECT_NEAR(searched.Choose(x, y), measured.Choose(x, y), 1e-4f);
     }
   }
   EXPECT_GT(squares, kSide * kSide / 8);
@@ -192,6 +203,28 @@ TEST(SmoothGrid, ADetailIsNotOutvoted) {
   page.Choose();
   EXPECT_GT(page.grid().At(20, 20).stray, 20.0f);
   EXPECT_NEAR(page.Smoothed(20, 20), 0.2f, 0.04f);
+}
+
+// Symptom: of few samples, one in a few dozen texels met the bright doorway and said so itself (its blocks differ by
+// all of it). Its quiet neighbours kept away from it, and it to itself: dim rooms were full of sparks.
+TEST(SmoothGrid, SparksAreSpread) {
+  Page page([](int, int) { return 1.0f; }, 0.1f, 5);
+  int sparks = 0;
+  for (int y = 3; y < kSide; y += 6) {
+    for (int x = 3; x < kSide; x += 6, ++sparks) {
+      page.grid().At(x, y).value += 4;
+      page.grid().At(x, y).variance = 16;
+    }
+  }
+  page.Choose();
+  double sum = 0;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      EXPECT_LT(page.Smoothed(x, y), 2.0f) << x << " " << y;
+      sum += static_cast<double>(page.Smoothed(x, y)) - 1;
+    }
+  }
+  EXPECT_GT(sum, 2 * sparks);  // their light is not thrown away; the chart's sum is the page filter's to keep
 }
 
 }  // namespace
