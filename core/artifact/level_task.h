@@ -29,7 +29,7 @@ inline constexpr KindName kSurvey{"texel/survey", 7};
 inline constexpr KindName kEmit{"photon/emit", 7};
 inline constexpr KindName kDensity{"photon/density", 6};
 inline constexpr KindName kGather{"gather/tiles", 15};
-inline constexpr KindName kFinish{"finish/page", 10};
+inline constexpr KindName kFinish{"finish/page", 11};
 inline constexpr KindName kReport{"finish/report", 4};
 inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};
 

@@ -1,5 +1,7 @@
 #include "worker/filter/smooth_tile.h"
 
+#include "worker/filter/connect.h"
+
 namespace bakewell {
 
 SmoothTile::SmoothTile(const TexelMap& map, uint32_t begin, uint32_t end)
@@ -72,7 +74,7 @@ std::vector<SmoothGrid::Smoothed> SmoothTile::Smooth() {
   ForEachKnown([&](size_t i, int x, int y) { result[i].variance = grid_.NoiseVariance(x, y); });
   ForEachKnown([&](size_t i, int, int) { CellOf(i).variance = result[i].variance; });
   std::vector<SmoothGrid::Steps> steps(result.size());
-  ForEachKnown([&](size_t i, int x, int y) { CellOf(i).radius = grid_.Choose(x, y, &steps[i]); });
+  ForEachKnown([&](size_t i, int x, int y) { grid_.Choose(x, y, &steps[i]); });
   ForEachKnown([&](size_t i, int x, int y) { result[i] = grid_.SmoothedAt(x, y, grid_.Agree(x, y), steps[i]); });
   return result;
 }

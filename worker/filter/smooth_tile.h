@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "worker/filter/window.h"
+#include "worker/texel/texels.h"
 
 namespace bakewell {
 

@@ -9,13 +9,12 @@ namespace bakewell {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr float kLift = 0.05f;       // height of the rays between neighbours, over their length
-constexpr float kSameFacing = 0.9f;  // least cosine between the normals of neighbours
-constexpr double kConfidence = 0.5;  // half width of a confidence interval, in standard errors
-constexpr float kMostOverOwn = 4;    // times a texel's own variance that its neighbours may make of it
-constexpr int kStrayRadius = 2;      // of the window whose strays say how large the noise is
-constexpr double kLeastStrays = 9;   // texels in it
-constexpr double kRidge = 1e-3;      // holds slopes back, so that texels in one line or one corner give an answer too
+constexpr double kConfidence = 0.5;                   // half width of a confidence interval, in standard errors
+constexpr float kMostOverOwn = 4;                     // times a texel's own variance that its neighbours may make of it
+constexpr int kStrayRadius = 2;                       // of the window whose strays say how large the noise is
+constexpr double kLeastStrays = 9;                    // texels in it
+constexpr float kStraysByNoise = 4, kStraysMost = 8;  // standard errors; from there on it is no noise
+constexpr double kRidge = 1e-3;  // holds slopes back, so that texels in one line or one corner give an answer too
 
 // Sums over a window's texels for a first-order regression over their offsets x, y [texels].
 struct Moments {
@@ -110,30 +109,6 @@ class Rings {
 constexpr Rings kRings;
 
 }  // namespace
-
-uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, bool crowded, int64_t& rays) {
-  const Texel& a = map.texels[texel];
-  const PageSize page = map.pages[a.page];
-  uint8_t open = 0;
-  for (size_t k = 0; k < 4; ++k) {
-    const int x = a.x + kNeighbours[k][0], y = a.y + kNeighbours[k][1];
-    if (x < 0 || y < 0 || x >= page.width || y >= page.height) continue;
-    const int32_t other =
-        map.texel_at[a.page][static_cast<size_t>(y) * static_cast<size_t>(page.width) + static_cast<size_t>(x)];
-    if (other < 0) continue;
-    const Texel& b = map.texels[other];
-    if (a.chart != b.chart || Dot(a.normal, b.normal) < kSameFacing) continue;
-    const float lift = kLift * Length(b.position - a.position);
-    const Vec3f from = a.position + a.normal * lift, way = b.position + b.normal * lift - from;
-    const float length = Length(way);
-    if (crowded && length > 0) {
-      ++rays;
-      if (world.Occluded({from, way / length, length, 0})) continue;
-    }
-    open |= static_cast<uint8_t>(1U << k);
-  }
-  return open;
-}
 
 void SmoothGrid::Connect(int x, int y, int k) {
   const int nx = x + kNeighbours[k][0], ny = y + kNeighbours[k][1];
@@ -230,6 +205,14 @@ class SmoothGrid::Growth {
   }
   bool Has(int dx, int dy) const {
     return std::max(std::abs(dx), std::abs(dy)) <= square_radius_ || inside_[Window::Index(dx, dy)];
+  }
+
+  // How far the centre is from what the others say of it, in standard errors of that; 0 where they say nothing.
+  float StrayOfCenter(const Weights& w, double estimate) const {
+    const double others = 1 - w.constant;  // the variance of the difference from the estimate, over that of a texel
+    if (others < 1e-3 || !center_->known) return 0;
+    return static_cast<float>(std::abs(static_cast<double>(center_->value) - estimate) /
+                              std::sqrt(others * mean_variance()));
   }
 
   // The regression's value at the centre.
@@ -362,7 +345,12 @@ float SmoothGrid::NoiseVariance(int x, int y) const {
   return std::min(pooled, static_cast<float>(window.Stray()));
 }
 
-float SmoothGrid::Choose(int x, int y, Steps* steps) const {
+void SmoothGrid::Choose(int x, int y, Steps* steps) {
+  SmoothCell& cell = At(x, y);
+  cell.radius = Grown(x, y, steps, cell.stray);
+}
+
+float SmoothGrid::Grown(int x, int y, Steps* steps, float& stray) const {
   Growth window(*this, x, y);
   double low = -kInfinity, high = kInfinity, overlap = 0, variance = kInfinity;
   for (int radius = 0;; ++radius) {
@@ -371,6 +359,7 @@ float SmoothGrid::Choose(int x, int y, Steps* steps) const {
     // A window that takes in noisier texels must not widen its interval: quiet texels keep away from them.
     variance = std::min(variance, window.Variance(weights));
     const double reach = kConfidence * std::sqrt(variance);
+    if (radius == 1) stray = window.StrayOfCenter(weights, estimate);
     if (steps != nullptr) (*steps)[static_cast<size_t>(radius)] = window.Result(weights, estimate);
     low = std::max(low, estimate - reach);
     high = std::min(high, estimate + reach);
@@ -393,7 +382,10 @@ float SmoothGrid::Agree(int x, int y) const {
     for (; place > 0 && radii[place - 1] > other.radius; --place) radii[place] = radii[place - 1];
     radii[place] = other.radius;
   }
-  return radii[(count - 1) / 2];
+  const float median = radii[(count - 1) / 2];
+  if (median <= cell.radius) return median;
+  const float follows = std::clamp((kStraysMost - cell.stray) / (kStraysMost - kStraysByNoise), 0.0f, 1.0f);
+  return cell.radius + follows * (median - cell.radius);
 }
 
 SmoothGrid::Window SmoothGrid::WindowOf(int x, int y, float radius) const {

@@ -1,21 +1,15 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
-
-#include "worker/texel/texels.h"
 
 namespace bakewell {
 
 // The eight neighbours of a texel. Direction k + 4 is the opposite of k.
 inline constexpr std::array<std::array<int, 2>, 8> kNeighbours = {
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
-
-// Which of its first four neighbours a texel is connected to, bit k for direction k: those of its chart that face about
-// the same way and that a short ray just above the surface reaches, which is not asked of texels that are not `crowded`
-// (IsCrowded).
-uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, bool crowded, int64_t& rays);
 
 // One texel of a noisy signal.
 struct SmoothCell {
@@ -26,6 +20,7 @@ struct SmoothCell {
   uint8_t part = 0;    // connected texels have the same, most others do not
   bool known = false;  // value and variance are there
   float radius = 0;    // of the window that it would choose by itself
+  float stray = 0;     // how far its value is from what its neighbours say of it, in standard errors
 };
 
 // A rectangle of texels with a noisy signal, and how far around each texel it may be averaged.
@@ -66,11 +61,12 @@ class SmoothGrid {
   };
   using Steps = std::array<Smoothed, kMostRadius + 1>;
   // The radius of the largest window whose estimate agrees with those of all smaller ones, between two whole ones where
-  // the intervals part: it is continuous in the values. On the way there, the estimates by radius.
-  float Choose(int x, int y, Steps* steps = nullptr) const;
+  // the intervals part: it is continuous in the values. On the way there, the estimates by radius. It goes into the
+  // texel's `radius`, with its `stray`.
+  void Choose(int x, int y, Steps* steps = nullptr);
 
-  // The median of the radii of a texel and its neighbours (SmoothCell::radius): a texel that strays by more than its
-  // interval, as some must, would otherwise keep to itself.
+  // The median of the radii of a texel and its neighbours: a texel that strays by more than its interval, as some must,
+  // would otherwise keep to itself. One that strays farther than noise does keeps to itself: it is a detail.
   float Agree(int x, int y) const;
 
   // What a window of `radius` gives; fills in the steps that it needs.
@@ -93,6 +89,7 @@ class SmoothGrid {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
   class Growth;
+  float Grown(int x, int y, Steps* steps, float& stray) const;
   void NumberParts();
   float PooledVariance(int x, int y) const;
   void AddWeights(const Growth& growth, int x, int y, float share, Window& window) const;

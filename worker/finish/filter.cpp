@@ -29,8 +29,7 @@ class PageFilter {
     ForEach([&](size_t k, const Texel& texel) { pooled[k] = grid_.NoiseVariance(texel.x, texel.y); });
     ForEach([&](size_t k, const Texel& texel) { grid_.At(texel.x, texel.y).variance = pooled[k]; });
     ForEach([&](size_t, const Texel& texel) {
-      SmoothCell& cell = grid_.At(texel.x, texel.y);
-      if (cell.known) cell.radius = grid_.Choose(texel.x, texel.y);
+      if (grid_.At(texel.x, texel.y).known) grid_.Choose(texel.x, texel.y);
     });
     std::vector<LightPart> smooth(texels_.size());
     std::vector<uint8_t> changed(texels_.size(), 0);

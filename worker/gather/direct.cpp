@@ -75,7 +75,9 @@ TileLights::Choice TileLights::ForTexel(const Texel& texel, float radius) const 
   const LightTree::Place place{texel.position, texel.flat ? texel.normal : Vec3f{}, radius};
   double seen = 0, unseen = 0;
   for (const Node& node : cut_) {
-    weights.push_back(scene_.tree.Importance(node.node, place) * node.visibility);
+    const float unoccluded = scene_.tree.Importance(node.node, place);
+    choice.unoccluded += unoccluded;
+    weights.push_back(unoccluded * node.visibility);
     choice.empty = choice.empty && !(weights.back() > 0);
     (node.seen ? seen : unseen) += static_cast<double>(weights.back());
   }

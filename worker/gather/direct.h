@@ -24,6 +24,7 @@ class TileLights {
   struct Choice {
     Distribution1D distribution;
     bool empty = true;
+    float unoccluded = 0;  // about the irradiance, luminance, of all of them if nothing stood between [W m^-2]
   };
   Choice ForTexel(const Texel& texel, float radius) const;
 

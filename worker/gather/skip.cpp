@@ -62,13 +62,17 @@ float MeanPhotonFlux(const SurfaceCells& cells, const RadianceCache& cache) {
   return cache.photons_seen > 0 ? static_cast<float>(flux / static_cast<double>(cache.photons_seen)) : 0;
 }
 
+float ExpectedIrradiance(const SurfaceCells& cells, const RadianceCache& cache, const TexelMap& map,
+                         const Texel& texel) {
+  const uint32_t triangle = map.fragments[texel.fragment_begin].triangle;
+  return Luminance(cache.light[2 * static_cast<size_t>(cells.CellAt(triangle, texel.position))].irradiance);
+}
+
 float DimmestIrradiance(const SurfaceCells& cells, const RadianceCache& cache, const TexelMap& map, uint32_t begin,
                         uint32_t end) {
   float dimmest = std::numeric_limits<float>::infinity();
   for (uint32_t i = begin; i < end; ++i) {
-    const uint32_t triangle = map.fragments[map.texels[i].fragment_begin].triangle;
-    const size_t cell = cells.CellAt(triangle, map.texels[i].position);
-    dimmest = std::min(dimmest, Luminance(cache.light[2 * cell].irradiance));
+    dimmest = std::min(dimmest, ExpectedIrradiance(cells, cache, map, map.texels[i]));
   }
   return dimmest;
 }

@@ -33,6 +33,10 @@ class PhotonDarkness {
 // Flux [W, luminance] that a photon brought to the surface on the mean; 0 without photons.
 float MeanPhotonFlux(const SurfaceCells& cells, const RadianceCache& cache);
 
+// Irradiance of a texel, luminance, as the photons saw it.
+float ExpectedIrradiance(const SurfaceCells& cells, const RadianceCache& cache, const TexelMap& map,
+                         const Texel& texel);
+
 // The least irradiance of texels [begin, end), luminance, as the photons saw it. What matters little is judged by this
 // and not by the bake's mean: a cellar of dim lamps under a sunlit level is not black to who stands in it.
 float DimmestIrradiance(const SurfaceCells& cells, const RadianceCache& cache, const TexelMap& map, uint32_t begin,

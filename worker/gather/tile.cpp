@@ -83,6 +83,7 @@ class TileGatherer {
     }
     work.choice = lights_->ForTexel(texel, radius);
     work.has_direct = !work.choice.empty || scene_.lights.samples_distant();
+    work.expected = ExpectedIrradiance(scene_.cells, scene_.cache, map_, texel);
   }
 
   bool Skips(Skip skip) const { return !options_.no_skip.Has(skip); }
@@ -387,7 +388,8 @@ class TileGatherer {
         const int doublings = has ? std::bit_width(static_cast<unsigned>(options_.max_samples / samples)) - 1 : 0;
         claims.push_back({has ? error : 0, cost * static_cast<float>(samples), doublings});
       };
-      claim(work.has_direct, work.direct_samples, 1, direct[i]);
+      const float missed = work.Missed(light[i]);
+      claim(work.has_direct, work.direct_samples, 1, std::max(direct[i], missed * missed));
       claim(work.has_indirect, work.indirect_samples, kGatherCost, indirect[i]);
     }
     return claims;

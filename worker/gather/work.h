@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <optional>
@@ -18,6 +19,7 @@ struct TexelWork {
 
   TexelSampler sampler;
   TileLights::Choice choice{};
+  float expected = 0;  // ExpectedIrradiance
   uint32_t key = 0;
   bool valid = true;
   bool crowded = true;                 // IsCrowded
@@ -36,6 +38,14 @@ struct TexelWork {
 
   Rgb DirectVariance() const { return direct.Variance() * direct_correction; }
   Rgb IndirectVariance() const { return indirect.Variance() * indirect_correction; }
+
+  // What all samples may have missed of the local lights, as where one of many shines through a slit, when the texel's
+  // light (luminance) is about `found`: as much as the photons saw more, but no more than one sample would have
+  // brought.
+  float Missed(float found) const {
+    if (choice.empty) return 0;
+    return std::max(0.0f, std::min(expected - found, choice.unoccluded / static_cast<float>(direct_samples)));
+  }
 
   // Variance of the texel's irradiance that comes from the finite number of photons.
   float PhotonVariance() const {

@@ -30,8 +30,9 @@ constexpr Directions MakeDirections(const Polynomial& polynomial) {
   return v;
 }
 
-// table[dimension][byte][value]: XOR of the reversed direction numbers of the bits set in one byte of the index.
-using Table = std::array<std::array<std::array<uint32_t, 256>, 4>, kSobolDimensions>;
+// table[byte][value]: for each dimension, XOR of the reversed direction numbers of the bits set in one byte of the
+// index.
+using Table = std::array<std::array<SobolLanes, 256>, 4>;
 
 const Table kTable = [] {
   Table table{};
@@ -42,7 +43,7 @@ const Table kTable = [] {
     for (int byte = 0; byte < 4; ++byte) {
       for (int value = 0; value < 256; ++value) {
         for (int bit = 0; bit < 8; ++bit) {
-          if (value >> bit & 1) table[d][byte][value] ^= ReverseBits(directions[8 * byte + bit]);
+          if (value >> bit & 1) table[byte][value][d] ^= ReverseBits(directions[8 * byte + bit]);
         }
       }
     }
@@ -52,10 +53,9 @@ const Table kTable = [] {
 
 }  // namespace
 
-uint32_t SobolReversed(uint32_t index, int dimension) {
-  const auto& bytes = kTable[dimension];
-  uint32_t x = bytes[0][index & 255U] ^ bytes[1][index >> 8 & 255U];
-  if (index >> 16) x ^= bytes[2][index >> 16 & 255U] ^ bytes[3][index >> 24];
+SobolLanes SobolReversed(uint32_t index) {
+  SobolLanes x = kTable[0][index & 255U] ^ kTable[1][index >> 8 & 255U];
+  if (index >> 16) x ^= kTable[2][index >> 16 & 255U] ^ kTable[3][index >> 24];
   return x;
 }
 

@@ -47,7 +47,7 @@ class Page {
 
   void Choose() {
     for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) grid_.At(x, y).radius = grid_.Choose(x, y);
+      for (int x = 0; x < kSide; ++x) grid_.Choose(x, y);
     }
   }
 
@@ -154,7 +154,10 @@ TEST(SmoothGrid, SquareWindowsAreWhatTheSearchFinds) {
       const auto sa = searched.SmoothedAt(x, y, 6.5f, steps_a), sb = measured.SmoothedAt(x, y, 6.5f, steps_b);
       EXPECT_NEAR(sa.value, sb.value, 1e-6f);
       EXPECT_NEAR(sa.variance, sb.variance, 1e-6f);
-      EXPECT_NEAR(searched.Choose(x, y), measured.Choose(x, y), 1e-4f);
+      searched.Choose(x, y);
+      measured.Choose(x, y);
+      EXPECT_NEAR(searched.At(x, y).radius, measured.At(x, y).radius, 1e-4f);
+      EXPECT_NEAR(searched.At(x, y).stray, measured.At(x, y).stray, 1e-3f * (1 + searched.At(x, y).stray));
     }
   }
   EXPECT_GT(squares, kSide * kSide / 8);
@@ -177,8 +180,18 @@ TEST(SmoothGrid, AStrayTexelIsOutvoted) {
   Page page([](int, int) { return 1.0f; }, 0.1f, 5);
   page.grid().At(20, 20).value = 1.4f;  // four standard errors
   page.Choose();
-  EXPECT_LT(page.grid().Choose(20, 20), 1.0f);
+  EXPECT_LT(page.grid().At(20, 20).radius, 1.0f);
   EXPECT_NEAR(page.Smoothed(20, 20), 1, 0.05f);
+}
+
+// Symptom: a dark texel in a corner among bright ones took its neighbours' window however little noise there was, which
+// cost shelves of books (eight texels a metre) half their error at 2 %.
+TEST(SmoothGrid, ADetailIsNotOutvoted) {
+  Page page([](int, int) { return 1.0f; }, 0.03f, 5);
+  page.grid().At(20, 20).value = 0.2f;  // 27 standard errors
+  page.Choose();
+  EXPECT_GT(page.grid().At(20, 20).stray, 20.0f);
+  EXPECT_NEAR(page.Smoothed(20, 20), 0.2f, 0.04f);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include "tests/support/bake_scene.h"
 #include "tests/support/scene_builder.h"
 #include "tests/support/skip_levels.h"
-#include "worker/filter/window.h"
+#include "worker/filter/connect.h"
 
 namespace bakewell {
 namespace {
