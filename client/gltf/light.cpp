@@ -27,8 +27,6 @@ std::string NameOfLight(const json& light, size_t index) {
 
 Rgb RgbOf(const json& array) { return {array[0].get<float>(), array[1].get<float>(), array[2].get<float>()}; }
 
-bool NonNegative(Rgb c) { return IsFinite(c) && c.x >= 0 && c.y >= 0 && c.z >= 0; }
-
 // Inner and outer cone angles as KHR_lights_punctual bounds them.
 absl::Status ReadCone(const json& light, const std::string& name, PunctualLight& out) {
   const double inner = NumberOr(light, {"spot", "innerConeAngle"}, 0.0);
@@ -55,7 +53,7 @@ absl::StatusOr<PunctualLight> ConvertLight(const json& light, const std::string&
   out.name = light.value("name", "");
   out.intensity = light.contains("color") ? RgbOf(light["color"]) : Rgb{1, 1, 1};
   out.intensity *= light.value("intensity", 1.0f);
-  if (!NonNegative(out.intensity)) return ErrorAt(name, "its colour times intensity is negative or not finite");
+  BAKEWELL_RETURN_IF_ERROR(CheckRadiated(name, "its colour times intensity", out.intensity));
   if (light.contains("range"))
     warnings.Add("the range of lights is ignored: light falls off with the square of distance");
   const std::string type = light["type"].get<std::string>();
@@ -93,10 +91,10 @@ int LightOf(const json& node) {
 
 const json& LightsJson(const Source& source) { return source.document.json["extensions"][kExtension]["lights"]; }
 
-absl::Status RequireNonNegative(const json& environment, const char* name, Rgb& out) {
+absl::Status ReadRadiance(const json& environment, const char* name, Rgb& out) {
   if (!environment.contains(name)) return ErrorAt("scene.extras.environment", absl::StrCat(name, " is missing"));
   out = RgbOf(environment[name]);
-  return NonNegative(out) ? absl::OkStatus() : ErrorAt("scene.extras.environment", absl::StrCat(name, " is negative"));
+  return CheckRadiated("scene.extras.environment", name, out);
 }
 
 // The baked scene's extras.`name`, or null.
@@ -107,6 +105,14 @@ const json* SceneExtra(const Source& source, const char* name) {
 }
 
 }  // namespace
+
+absl::Status CheckRadiated(const std::string& name, const std::string& what, Rgb light) {
+  if (IsRadiated(light)) return absl::OkStatus();
+  if (!IsFinite(light)) return ErrorAt(name, what + " is not finite");
+  if (MaxComponent(light) <= kMostRadiated) return ErrorAt(name, what + " is negative");
+  return ErrorAt(name, absl::StrCat(what, ", ", MaxComponent(light), ", is above ", kMostRadiated,
+                                    ", beyond which errors cannot be told; scale all lights of the level down"));
+}
 
 absl::StatusOr<std::vector<PlacedLight>> ReadLights(const Source& source, const std::vector<PlacedNode>& nodes,
                                                     Warnings& warnings) {
@@ -132,14 +138,14 @@ absl::StatusOr<Environment> ReadEnvironment(const Source& source) {
   if (type == "none") return out;
   if (type == "constant") {
     out.type = EnvironmentType::kConstant;
-    BAKEWELL_RETURN_IF_ERROR(RequireNonNegative(environment, "radiance", out.radiance));
+    BAKEWELL_RETURN_IF_ERROR(ReadRadiance(environment, "radiance", out.radiance));
     return out;
   }
   if (type != "gradient") return ErrorAt("scene.extras.environment", "type \"" + type + "\" does not exist");
   out.type = EnvironmentType::kGradient;
-  BAKEWELL_RETURN_IF_ERROR(RequireNonNegative(environment, "zenith", out.zenith));
-  BAKEWELL_RETURN_IF_ERROR(RequireNonNegative(environment, "horizon", out.horizon));
-  BAKEWELL_RETURN_IF_ERROR(RequireNonNegative(environment, "ground", out.ground));
+  BAKEWELL_RETURN_IF_ERROR(ReadRadiance(environment, "zenith", out.zenith));
+  BAKEWELL_RETURN_IF_ERROR(ReadRadiance(environment, "horizon", out.horizon));
+  BAKEWELL_RETURN_IF_ERROR(ReadRadiance(environment, "ground", out.ground));
   return out;
 }
 

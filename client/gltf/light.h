@@ -13,9 +13,12 @@ struct PlacedLight {
   Vec3d position_ws;
 };
 
+// kInvalidArgument unless IsRadiated(light): "name: what is negative", and so on.
+absl::Status CheckRadiated(const std::string& name, const std::string& what, Rgb light);
+
 // KHR_lights_punctual of every placed node, in their order. Radiometric 1:1 (theory.md 1); extras.angularDiameterDeg of
-// a directional light is its angular diameter. kInvalidArgument naming the light: negative or unknown values, an axis
-// that the node's transform squashes to nothing, a position beyond 10^9 m.
+// a directional light is its angular diameter. kInvalidArgument naming the light: negative, too great or unknown
+// values, an axis that the node's transform squashes to nothing, a position beyond 10^9 m.
 absl::StatusOr<std::vector<PlacedLight>> ReadLights(const Source& source, const std::vector<PlacedNode>& nodes,
                                                     Warnings& warnings);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "client/gltf/file/schema.h"
+#include "client/gltf/light.h"
 
 namespace bakewell::gltf {
 namespace {
@@ -94,9 +95,7 @@ absl::Status MaterialReader::ReadEmission(const json& material, const std::strin
   if (strength < 0) return ErrorAt(name, absl::StrCat("emissiveStrength ", strength, " is negative"));
   if (const json* factor = Find(material, {"emissiveFactor"})) {
     out.emission = RgbOf(*factor) * static_cast<float>(strength);
-    if (std::min({out.emission.x, out.emission.y, out.emission.z}) < 0)
-      return ErrorAt(name, "emissiveFactor is negative");
-    if (!IsFinite(out.emission)) return ErrorAt(name, "its emission is not finite");
+    BAKEWELL_RETURN_IF_ERROR(CheckRadiated(name, "its emission", out.emission));
   }
   const json* info = Find(material, {"emissiveTexture"});
   if (!info || out.emission == Rgb{}) return absl::OkStatus();

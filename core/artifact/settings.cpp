@@ -65,22 +65,17 @@ absl::Status CheckLight(const BakeSettings& settings) {
   return absl::OkStatus();
 }
 
-bool IsRadiance(const Rgb& rgb) {
-  for (const float value : {rgb.x, rgb.y, rgb.z}) {
-    if (!(value >= 0 && std::isfinite(value))) return false;
-  }
-  return true;
-}
-
 absl::Status CheckEnvironment(const Environment& environment) {
   for (const Rgb& rgb : {environment.radiance, environment.zenith, environment.horizon, environment.ground}) {
-    if (!IsRadiance(rgb)) return absl::InvalidArgumentError("environment radiances must be finite and not negative");
+    if (IsRadiated(rgb)) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat("environment radiances must be finite, not negative and at most ", kMostRadiated));
   }
   for (size_t i = 0; i < environment.latlong.size(); ++i) {
-    if (IsRadiance(environment.latlong[i])) continue;
+    if (IsRadiated(environment.latlong[i])) continue;
     const auto width = static_cast<size_t>(environment.width);
-    return absl::InvalidArgumentError(
-        absl::StrCat("environment pixel (", i % width, ", ", i / width, ") is negative or not finite"));
+    return absl::InvalidArgumentError(absl::StrCat("environment pixel (", i % width, ", ", i / width,
+                                                   ") is negative, not finite or above ", kMostRadiated));
   }
   return absl::OkStatus();
 }

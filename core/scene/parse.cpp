@@ -39,6 +39,13 @@ std::vector<T> GetFiniteVector(ByteReader& reader) {
   return values;
 }
 
+// Light of a lamp, a surface or the sky.
+Rgb GetRadiated(ByteReader& reader) {
+  const Rgb light = GetFinite<Rgb>(reader);
+  if (!IsRadiated(light)) reader.Fail(absl::StrCat("a light is negative or above ", kMostRadiated));
+  return light;
+}
+
 template <typename E>
 E GetEnum(ByteReader& reader, E last) {
   const auto value = reader.Get<uint8_t>();
@@ -80,12 +87,15 @@ Environment GetEnvironment(ByteReader& reader) {
   Environment environment;
   environment.type = GetEnum(reader, EnvironmentType::kLatLong);
   for (Rgb* radiance : {&environment.radiance, &environment.zenith, &environment.horizon, &environment.ground}) {
-    *radiance = GetFinite<Rgb>(reader);
+    *radiance = GetRadiated(reader);
   }
   environment.width = reader.Get<int32_t>();
   environment.height = reader.Get<int32_t>();
   environment.latlong = GetFiniteVector<Rgb>(reader);
   RequirePixels(reader, environment.width, environment.height, environment.latlong.size());
+  if (!std::all_of(environment.latlong.begin(), environment.latlong.end(), IsRadiated)) {
+    reader.Fail(absl::StrCat("a pixel of the environment is negative or above ", kMostRadiated));
+  }
   if (environment.type == EnvironmentType::kLatLong && environment.latlong.empty()) {
     reader.Fail("a latitude-longitude environment has no pixels");
   }
@@ -121,7 +131,7 @@ Material GetMaterial(ByteReader& reader, size_t textures) {
   material.base_texture = GetTextureRef(reader, textures);
   material.alpha_mode = GetEnum(reader, AlphaMode::kBlend);
   material.alpha_cutoff = GetFinite<float>(reader);
-  material.emission = GetFinite<Rgb>(reader);
+  material.emission = GetRadiated(reader);
   material.emission_texture = GetTextureRef(reader, textures);
   material.double_sided = GetBool(reader);
   return material;
@@ -130,7 +140,8 @@ Material GetMaterial(ByteReader& reader, size_t textures) {
 PunctualLight GetLight(ByteReader& reader) {
   PunctualLight light;
   light.type = GetEnum(reader, LightType::kDirectional);
-  for (Vec3f* value : {&light.intensity, &light.position, &light.direction, &light.tangent}) {
+  light.intensity = GetRadiated(reader);
+  for (Vec3f* value : {&light.position, &light.direction, &light.tangent}) {
     *value = GetFinite<Vec3f>(reader);
   }
   for (float* value : {&light.cos_inner, &light.cos_outer, &light.angular_diameter_rad}) {

@@ -64,6 +64,15 @@ struct Object {
   ObjectSource source;
 };
 
+// The most that a lamp or a sun may bring [W/sr, W m^-2] and a surface or the sky radiate [W m^-2 sr^-1], per channel.
+// Errors are squares, and floats end at 3.4e38: this leaves a factor of 10^3 for lamps that nearly touch what they
+// light.
+inline constexpr float kMostRadiated = 1e15f;
+
+inline bool IsRadiated(Rgb light) {
+  return IsFinite(light) && std::min({light.x, light.y, light.z}) >= 0 && MaxComponent(light) <= kMostRadiated;
+}
+
 enum class LightType : uint8_t { kPoint, kSpot, kDirectional };
 
 // KHR_lights_punctual, radiometric 1:1 (theory.md 1).

@@ -6,7 +6,9 @@
 #include <sstream>
 
 #include "client/cli/cli.h"
+#include "client/job/result.h"
 #include "client/local/bake.h"
+#include "client/local/farm.h"
 #include "core/artifact/atomic_file.h"
 #include "core/artifact/manifest.h"
 #include "tests/support/bake_scene.h"
@@ -115,6 +117,39 @@ TEST(EmbeddedBake, GivesTheBytesOfTheBareKernelsAfterAPreviewOfTheLight) {
   settings.uv = UvMode::kGenerate;
   settings.density = DensityMode::kSignal;
   ExpectTheBytesOfTheBareKernels(settings);
+}
+
+// Fetches the result of a farm in `farm_folder` into `out_folder`. How many files were there before it fetched any.
+size_t FetchFrom(const TempDir& farm_folder, const fs::path& out_folder) {
+  SilentProgress progress;
+  const auto submission = MakeSubmission(kSample, SmallSettings());
+  const auto farm = EmbeddedFarm::Start(farm_folder / "farm", 2, "", progress);
+  EXPECT_TRUE(submission.ok() && farm.ok()) << submission.status() << farm.status();
+  FarmClient& client = (*farm)->client();
+  const auto submitted = client.Submit(submission->scene_bytes, {"", "", submission->settings_bytes, true});
+  EXPECT_TRUE(submitted.ok()) << submitted.status();
+  const auto job = client.Watch(submitted->job_id(), [](const v1::Job&) { return true; });
+  EXPECT_TRUE(job.ok() && job->state() == v1::DONE) << job.status();
+  auto out = OutputDir::Create(out_folder);
+  EXPECT_TRUE(out.ok()) << out.status();
+  (*farm)->HandOver(*job, out->Staging());
+  const size_t handed = NamesIn(out->Staging()).size();
+  const auto manifest = FetchResult(client, *job, *submission, *out);
+  EXPECT_TRUE(manifest.ok()) << manifest.status();
+  EXPECT_TRUE(Conclude(*out, out_folder, *manifest).ok());
+  return handed;
+}
+
+TEST(EmbeddedBake, GivesTheSameWhereFilesCannotBeLinked) {
+  const TempDir disk, memory("/dev/shm");
+  if (OnOneFileSystem(disk, memory)) GTEST_SKIP() << "/dev/shm and the folder for files that pass are one";
+  EXPECT_GT(FetchFrom(disk, disk / "linked"), 5u);
+  EXPECT_EQ(FetchFrom(memory, disk / "fetched"), 0u);
+  const std::set<std::string> names = NamesIn(disk / "linked");
+  EXPECT_EQ(NamesIn(disk / "fetched"), names);
+  for (const std::string& name : names) {
+    EXPECT_TRUE(BytesOf(disk / "linked" / name) == BytesOf(disk / "fetched" / name)) << name;
+  }
 }
 
 TEST(EmbeddedBake, PhasesComeInOrderAndNothingElseIsLeftBehind) {

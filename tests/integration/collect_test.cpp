@@ -59,6 +59,9 @@ TEST_F(CollectTest, KeepsWhatALiveJobNeeds) {
   const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
   EXPECT_EQ(ended->state(), v1::DONE);
   EXPECT_EQ(worker.worker->counters().failed, 0);
+  const int64_t done = worker.worker->counters().done;
+  farm.Bake(scene);
+  EXPECT_EQ(worker.worker->counters().done, done) << "what had been done before was forgotten";
 }
 
 TEST_F(CollectTest, HappensByItselfEveryHour) {

@@ -66,6 +66,16 @@ TEST(PhotonsFor, ASmallerErrorNeedsMoreAndANumberOfOnesOwnIsKept) {
   EXPECT_EQ(room.Needed(settings), 4711);
 }
 
+// Texels are few, so that bounces cost little; the same pilot serves both.
+TEST(PhotonsFor, HalfTheErrorNeedsFourTimesThePhotonsWhereTheirNoiseDecides) {
+  const Prepared room(SlitLevel(24, 0.02));
+  BakeSettings settings;
+  settings.target_error = 0.016f;
+  const auto coarse = static_cast<double>(room.Needed(settings));
+  settings.target_error = 0.008f;
+  EXPECT_NEAR(static_cast<double>(room.Needed(settings)) / coarse, 4, 0.01);
+}
+
 TEST(PhotonsFor, IsTheSameForAnyNumberOfThreads) {
   const Prepared room(RoomBehindASlit());
   std::vector<int64_t> needed;

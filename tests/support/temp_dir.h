@@ -1,5 +1,6 @@
 #pragma once
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -33,6 +34,15 @@ class TempDir {
  private:
   std::filesystem::path path_;
 };
+
+// Whether files of one may have a second name in the other. Tests of what happens where they may not are skipped where
+// there is only one file system.
+inline bool OnOneFileSystem(const TempDir& a, const TempDir& b) {
+  struct stat of_a {
+  }, of_b{};
+  BAKEWELL_CHECK(stat(a.path().c_str(), &of_a) == 0 && stat(b.path().c_str(), &of_b) == 0);
+  return of_a.st_dev == of_b.st_dev;
+}
 
 // Writes a file without syncing it, for tests that write thousands. ext4 syncs a file that is truncated and written
 // again, so an old one is removed first.

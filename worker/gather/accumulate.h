@@ -11,6 +11,10 @@ namespace bakewell {
 inline constexpr int kBlocks = 8;
 inline constexpr uint32_t kRun = 64;  // samples
 
+// Samples are good up to here [W m^-2, W m^-2 sr^-1 times an inverse density]: the variance of a texel is a square.
+inline constexpr float kBrightestSample = 1e18f;
+inline bool IsGoodSample(Rgb sample) { return IsFinite(sample) && MaxComponent(sample) <= kBrightestSample; }
+
 // Sums of one estimator of one texel: irradiance and SH of the incident radiance, and the spread of the irradiance over
 // eight blocks of consecutive samples. Samples come in rounds that double their number; Double() halves the resolution
 // of the blocks so that eight always cover everything. Block means of one Sobol set repel one another, so that their

@@ -124,7 +124,7 @@ class DirectAdder {
     const float light_pdf = sample.pdf * probability;
     const float weight = sample.pdf > 0 ? PowerHeuristic(light_pdf, GatherPdf(cosine)) : 1.0f;
     const Rgb radiance_over_pdf = sample.perpendicular * (weight / probability);
-    if (!IsFinite(radiance_over_pdf)) {
+    if (!IsGoodSample(radiance_over_pdf)) {
       ++counters_.bad_samples;
       return true;
     }

@@ -39,7 +39,7 @@ bool PhotonDarkness::CoversPlace(const SurfacePoint& point) const {
     for (int nx = std::max(0, x - kReach); nx <= std::min(patch.width - 1, x + kReach); ++nx) {
       const size_t at = patch.first_cell + static_cast<size_t>(ny) * static_cast<size_t>(patch.width) + nx;
       if (IsDark(at)) {
-        area += static_cast<double>(cells_.cells()[at].area);
+        area += static_cast<double>(cells_.cells()[at].area * cells_.cells()[at].met[0]);
       } else if (window <= 2 * kReach) {
         return false;
       }
@@ -56,7 +56,8 @@ bool PhotonDarkness::Covers(const TexelSampler& sampler) const {
 float MeanPhotonFlux(const SurfaceCells& cells, const RadianceCache& cache) {
   double flux = 0;
   for (size_t i = 0; i < cache.light.size(); ++i) {
-    flux += static_cast<double>(Luminance(cache.light[i].irradiance)) * static_cast<double>(cells.cells()[i / 2].area);
+    const SurfaceCell& cell = cells.cells()[i / 2];
+    flux += static_cast<double>(Luminance(cache.light[i].irradiance) * cell.area * cell.met[i % 2]);
   }
   return cache.photons_seen > 0 ? static_cast<float>(flux / static_cast<double>(cache.photons_seen)) : 0;
 }

@@ -293,19 +293,17 @@ class TileGatherer {
     escaped_ += ray.hit ? 0 : 1;
     const float pdf = GatherPdf(ray.cosine);
     Rgb radiance = FoundByGather(scene_, lights_ ? &*lights_ : nullptr, work.choice, ray.from, ray.dir, pdf, ray.hit);
-    if (ray.hit) {
-      const GatheredRadiance reflected = ReflectedRadiance(scene_, ray.hit, ray.key, counters_);
-      radiance += reflected.radiance;
-      const float weight = ray.cosine / (pdf * ray.density);
-      for (size_t g = 0; g < kVarianceGroups; ++g) work.group[g] += reflected.group[g] * weight;
-    }
-    if (!IsFinite(radiance)) {
+    GatheredRadiance reflected;
+    if (ray.hit) reflected = ReflectedRadiance(scene_, ray.hit, ray.key, counters_);
+    // Multiple importance sampling went by the unguided density, here as in GatherDirect.
+    radiance = (radiance + reflected.radiance) / ray.density;
+    const Rgb irradiance = radiance * (ray.cosine / pdf);
+    if (!IsGoodSample(radiance) || !IsGoodSample(irradiance)) {
       ++counters_.bad_samples;
       return;
     }
-    // Multiple importance sampling went by the unguided density, here as in GatherDirect.
-    radiance = radiance / ray.density;
-    const Rgb irradiance = radiance * (ray.cosine / pdf);
+    const float weight = ray.cosine / (pdf * ray.density);
+    for (size_t g = 0; g < kVarianceGroups; ++g) work.group[g] += reflected.group[g] * weight;
     if (collects_) {
       found_.Add(ray.hit ? scene_.world.PointAt(ray.hit).position : ray.dir, !ray.hit, Luminance(irradiance));
     }

@@ -6,12 +6,13 @@
 #include <cmath>
 
 #include "core/base/fields.h"
+#include "worker/gather/accumulate.h"
 
 namespace bakewell {
 
 namespace {
 
-constexpr double kMostBadSamples = 1e-6;  // share of NaN or infinite samples above which a bake fails
+constexpr double kMostBadSamples = 1e-6;  // share of samples that are not good, above which a bake fails
 
 }  // namespace
 
@@ -99,9 +100,10 @@ absl::StatusOr<BakeReport> BakeTally::Finish(const level_task::PhotonCounts& pho
                                              const SkipSet& no_skip) const {
   const double samples = static_cast<double>(counters_.gather_rays + counters_.shadow_rays);
   if (static_cast<double>(counters_.bad_samples) > kMostBadSamples * samples) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(counters_.bad_samples, " of ", static_cast<int64_t>(samples),
-                     " samples were NaN or infinite; lights or emission of this scene are beyond what float can hold"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        counters_.bad_samples, " of ", static_cast<int64_t>(samples), " samples were no numbers or above ",
+        kBrightestSample,
+        " W m^-2; move lamps away from the surfaces that they touch, or scale all lights of this scene down"));
   }
   BakeReport report;
   report.counters = {{"texels/covered", texels_},

@@ -1,10 +1,8 @@
 #include "worker/light/lights.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 
 #include "worker/light/spherical_triangle.h"
 #include "worker/sample/warp.h"
@@ -14,32 +12,19 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Mean of a textured emission over a triangle: a fixed 8 x 8 pattern of the low-distortion map.
+// Mean radiance of a triangle and its sides that glow: over a fixed 8 x 8 pattern of the low-distortion map where it is
+// not the same everywhere.
 Rgb MeanRadiance(const World& world, uint32_t triangle) {
-  if (world.MaterialOf(world.triangles()[triangle]).emission_texture.texture < 0) {
-    return world.FrontEmissionAt(triangle, 0, 0);
-  }
+  const Material& material = world.MaterialOf(world.triangles()[triangle]);
+  if (material.emission_texture.texture < 0 && world.IsAlwaysMet(triangle)) return material.emission;
+  const int sides = material.double_sided ? 2 : 1;
   Rgb sum;
   for (int i = 0; i < 64; ++i) {
     const Vec2f b =
         TriangleFromSquare({(static_cast<float>(i % 8) + 0.5f) / 8, (static_cast<float>(i / 8) + 0.5f) / 8});
-    sum += world.FrontEmissionAt(triangle, b.x, b.y);
+    for (int side = 0; side < sides; ++side) sum += world.GlowAt(triangle, b.x, b.y, side == 1);
   }
-  return sum * (1.0f / 64);
-}
-
-// What coinciding triangles with the same front and the same light have in common: the corners, smallest first and the
-// order around kept, and the radiance.
-using GlowKey = std::array<float, 12>;
-GlowKey KeyOf(const Triangle& t, Rgb radiance) {
-  const std::array<Vec3f, 3> corners{t.p0, t.p0 + t.e1, t.p0 + t.e2};
-  GlowKey least;
-  least.fill(kInfinity);
-  for (size_t turn = 0; turn < 3; ++turn) {
-    const Vec3f a = corners[turn], b = corners[(turn + 1) % 3], c = corners[(turn + 2) % 3];
-    least = std::min(least, {a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z, radiance.x, radiance.y, radiance.z});
-  }
-  return least;
+  return sum * (1.0f / static_cast<float>(64 * sides));
 }
 
 }  // namespace
@@ -59,17 +44,14 @@ LightSet::LightSet(const World& world, const Environment& environment) : world_(
     if (light.type != LightType::kDirectional) continue;
     discs_.push_back({FrameFromHint(-light.direction, light.tangent), std::sin(0.5f * light.angular_diameter_rad)});
   }
-  std::map<GlowKey, int> glowing;
   for (uint32_t k = 0; k < world.triangles().size(); ++k) {
     if (!world.Emits(k)) continue;
     const Triangle& t = world.triangles()[k];
     const Rgb radiance = MeanRadiance(world, k);
     if (MaxComponent(radiance) <= 0) continue;
     if (light_of_triangle_.empty()) light_of_triangle_.assign(world.triangles().size(), -1);
-    // Of triangles that coincide one glows: rays meet one of them only, whichever it is.
-    const auto [first, is_new] = glowing.try_emplace(KeyOf(t, radiance), local_count());
-    light_of_triangle_[k] = first->second;
-    if (is_new) emissive_.push_back({k, 0.5f * Length(Cross(t.e1, t.e2)), radiance, world.MaterialOf(t).double_sided});
+    light_of_triangle_[k] = local_count();
+    emissive_.push_back({k, 0.5f * Length(Cross(t.e1, t.e2)), radiance, world.MaterialOf(t).double_sided});
   }
 }
 
@@ -114,7 +96,7 @@ LightSample LightSet::SampleTriangle(const EmissiveTriangle& light, Vec3f positi
   const SurfacePoint end = world_.PointAt(light.triangle, b.x, b.y, cos_light < 0);
   sample.target = RayOrigin(end);
   sample.target_triangle = light.triangle;
-  sample.perpendicular = world_.FrontEmissionAt(light.triangle, b.x, b.y) / sample.pdf;
+  sample.perpendicular = world_.GlowAt(light.triangle, b.x, b.y, cos_light < 0) / sample.pdf;
   return sample;
 }
 

@@ -7,7 +7,7 @@
 
 namespace bakewell {
 
-// A triangle that emits, with its mean front radiance.
+// A triangle that emits, with the mean radiance of what glows: its front, or both sides (World::GlowAt).
 struct EmissiveTriangle {
   uint32_t triangle = 0;
   float area = 0;  // [m^2]
@@ -41,7 +41,7 @@ class LightSet {
   bool samples_distant() const { return !directionals_.empty() || (environment_.bright() && !environment_.smooth()); }
   bool IsEmissive(int light) const { return light >= static_cast<int>(locals_.size()); }
 
-  // The local light of an emissive triangle, or -1. Triangles that coincide are one light.
+  // The local light of an emissive triangle, or -1: of those that coincide, the ones that rays meet are lights.
   int LightOfTriangle(uint32_t triangle) const;
 
   // A point of local light `light` as seen from `position`. pdf: uniform in solid angle for near triangles, in area for

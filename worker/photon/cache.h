@@ -35,9 +35,9 @@ struct DensityOptions {
   bool probe_unlit = false;  // search the neighbourhoods of sides that no photon met as well
 };
 
-// E ~ sum of flux / sum of exact area over the smallest square neighbourhood that holds target_count photons and that
-// can be reached from the cell without passing through geometry (short rays between cell centres), inside the cell's
-// patch.
+// E ~ sum of flux / sum of the area that rays meet (exact where there is no alpha) over the smallest square
+// neighbourhood that holds target_count photons and that can be reached from the cell without passing through geometry
+// (short rays between cell centres), inside the cell's patch.
 RadianceCache EstimateDensity(const World& world, const SurfaceCells& cells, const PhotonMap& map,
                               const PhotonPlan& plan, const DensityOptions& options, Progress& progress);
 

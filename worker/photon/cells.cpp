@@ -1,10 +1,13 @@
 #include "worker/photon/cells.h"
 
+#include <bit>
 #include <cmath>
 #include <map>
 
 #include "core/base/check.h"
 #include "worker/photon/patches.h"
+#include "worker/sample/hash.h"
+#include "worker/sample/warp.h"
 #include "worker/texel/raster.h"
 
 namespace bakewell {
@@ -52,8 +55,34 @@ Vec3f LongestBoundaryEdge(const World& world, const std::vector<uint32_t>& trian
 // Sums of one cell while its patch is measured.
 struct CellSum {
   double projected = 0, area = 0;
+  std::array<double, 2> met{};  // projected
   Vec3d position, normal;
 };
+
+// Integral of World::ShareMet from the front and the back over a part of a triangle, given in the plane and by the
+// barycentrics of a point of the plane: nine jittered points in each triangle of its fan.
+template <typename Barycentrics>
+std::array<double, 2> MetArea(const World& world, uint32_t triangle, const ConvexPolygon& part,
+                              Barycentrics barycentrics) {
+  if (world.IsAlwaysMet(triangle)) return {std::fabs(part.SignedArea()), std::fabs(part.SignedArea())};
+  constexpr int kSide = 3;
+  std::array<double, 2> met{};
+  for (int i = 1; i + 1 < part.count; ++i) {
+    const Vec2d a = part.corner[i] - part.corner[0], b = part.corner[i + 1] - part.corner[0];
+    const double area = 0.5 * std::fabs(Cross(a, b)) / (kSide * kSide);
+    for (int s = 0; s < kSide * kSide; ++s) {
+      const Vec2f at = barycentrics(part.corner[0] + a * 0.5 + b * 0.25);
+      const uint32_t key = HashCombine(HashCombine(triangle, std::bit_cast<uint32_t>(at.x)), static_cast<uint32_t>(s));
+      const Vec2f w = TriangleFromSquare({(static_cast<float>(s % kSide) + UnitFloat(Hash(key))) / kSide,
+                                          (static_cast<float>(s / kSide) + UnitFloat(Hash(key + 1))) / kSide});
+      const Vec2f p = barycentrics(part.corner[0] + a * static_cast<double>(w.x) + b * static_cast<double>(w.y));
+      for (size_t side = 0; side < 2; ++side) {
+        met[side] += area * static_cast<double>(world.ShareMet(triangle, p.x, p.y, side == 1));
+      }
+    }
+  }
+  return met;
+}
 
 constexpr int64_t kMaxPatchCells = int64_t{1} << 28;
 constexpr int kMostDoublings = 6, kSpared = 2;  // of the smallest cells' sides; doublings that are not worth it
@@ -128,6 +157,12 @@ bool MeasurePatch(const World& world, const std::vector<uint32_t>& triangles, Ce
         flat[0], flat[1], flat[2], patch.width, patch.height, [&](int x, int y, const ConvexPolygon& polygon) {
           CellSum& sum = sums[static_cast<size_t>(y) * static_cast<size_t>(patch.width) + static_cast<size_t>(x)];
           const double projected = std::fabs(polygon.SignedArea());
+          const auto barycentrics = [&](Vec2d p) {
+            return Vec2f{static_cast<float>(Cross(p - flat[0], e2) / det),
+                         static_cast<float>(Cross(e1, p - flat[0]) / det)};
+          };
+          const auto met = MetArea(world, k, polygon, barycentrics);
+          sum.met = {sum.met[0] + met[0], sum.met[1] + met[1]};
           Vec2d center;
           for (int i = 0; i < polygon.count; ++i) center = center + polygon.corner[i] * (1.0 / polygon.count);
           const Vec2d d = center - flat[0];
@@ -146,8 +181,10 @@ bool MeasurePatch(const World& world, const std::vector<uint32_t>& triangles, Ce
       cells.push_back({});
       continue;
     }
-    cells.push_back({static_cast<float>(sum.area * square), ToFloat(sum.position / sum.projected),
-                     ToFloat(NormalizeOrZero(sum.normal))});
+    cells.push_back({static_cast<float>(sum.area * square),
+                     ToFloat(sum.position / sum.projected),
+                     ToFloat(NormalizeOrZero(sum.normal)),
+                     {static_cast<float>(sum.met[0] / sum.projected), static_cast<float>(sum.met[1] / sum.projected)}});
   }
   return true;
 }

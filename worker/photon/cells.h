@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,6 +26,8 @@ struct SurfaceCell {
   float area = 0;  // of the surface inside [m^2]; 0: nothing there
   Vec3f position;  // centroid of that surface [m]
   Vec3f normal;    // unit, area-weighted, front
+  // The share of the rays to its front and its back that meet it (World::ShareMet), from points all over it.
+  std::array<float, 2> met{};
 };
 
 class SurfaceCells {

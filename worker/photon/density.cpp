@@ -119,7 +119,7 @@ class Estimator {
   struct Sum {
     std::array<double, 3> flux{};
     std::array<double, kVarianceGroups> group{};
-    double area = 0;
+    double area = 0, met = 0;  // of the surface; of what rays meet of it
     int64_t count = 0;
   };
 
@@ -129,7 +129,9 @@ class Estimator {
       sum.flux[c] += static_cast<double>(flux.flux[c]);
     }
     for (size_t g = 0; g < kVarianceGroups; ++g) sum.group[g] += static_cast<double>(flux.group[g]);
-    sum.area += static_cast<double>(cells_.cells()[i / 2].area);
+    const SurfaceCell& cell = cells_.cells()[i / 2];
+    sum.area += static_cast<double>(cell.area);
+    sum.met += static_cast<double>(cell.area * cell.met[i % 2]);
     sum.count += flux.count;
   }
 
@@ -189,7 +191,8 @@ class Estimator {
   }
 
   void Store(size_t i, const Sum& sum, int radius) {
-    const double per_area = inverse_scale_ / sum.area;
+    if (sum.met <= 0) return;
+    const double per_area = inverse_scale_ / sum.met;
     CachedLight& light = cache_.light[i];
     light.irradiance = {static_cast<float>(sum.flux[0] * per_area), static_cast<float>(sum.flux[1] * per_area),
                         static_cast<float>(sum.flux[2] * per_area)};

@@ -44,11 +44,12 @@ Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_p
                     float u_side, double photons) {
   const Triangle& t = world.triangles()[light.triangle];
   const Vec2f b = TriangleFromSquare(u_position);
-  const SurfacePoint point = world.PointAt(light.triangle, b.x, b.y, light.two_sided && u_side < 0.5f);
+  const bool back = light.two_sided && u_side < 0.5f;
+  const SurfacePoint point = world.PointAt(light.triangle, b.x, b.y, back);
   const Frame frame = FrameFromHint(point.normal, t.e1);
   const double sides = light.two_sided ? 2 : 1;
   return {RayOrigin(point), frame.ToWorld(CosineHemisphere(u_direction)),
-          world.FrontEmissionAt(light.triangle, b.x, b.y) *
+          world.GlowAt(light.triangle, b.x, b.y, back) *
               static_cast<float>(kPi * static_cast<double>(light.area) * sides / photons),
           0, light.triangle};
 }

@@ -10,6 +10,7 @@
 
 #include "core/base/check.h"
 #include "worker/sample/hash.h"
+#include "worker/trace/coincident.h"
 #include "worker/trace/texture.h"
 
 namespace bakewell {
@@ -47,9 +48,7 @@ namespace {
 
 // False for triangles without area or with coordinates that are not numbers.
 bool MakeTriangle(const Object& object, uint32_t k, Triangle& triangle) {
-  const Vec3f p0 = object.position[object.index[3 * k]];
-  const Vec3f p1 = object.position[object.index[3 * k + 1]];
-  const Vec3f p2 = object.position[object.index[3 * k + 2]];
+  const Vec3f p0 = CornerOf(object, k, 0), p1 = CornerOf(object, k, 1), p2 = CornerOf(object, k, 2);
   triangle.p0 = p0;
   triangle.e1 = p1 - p0;
   triangle.e2 = p2 - p0;
@@ -84,19 +83,28 @@ absl::Status World::BuildTriangles() {
   for (const Object& object : scene_.objects) total += object.index.size() / 3;
   if (total >= kNoTriangle) return absl::InvalidArgumentError("the scene has more than 2^32 - 2 triangles; split it");
   triangles_.reserve(total);
-  for (const bool opaque : {true, false}) {
+  const std::vector<Coincident> coincident = FindCoincident(scene_);
+  std::vector<std::pair<uint32_t, uint32_t>> groups;
+  for (const bool always_met : {true, false}) {
+    uint64_t number = 0;
+    auto next = coincident.begin();
     for (uint32_t o = 0; o < scene_.objects.size(); ++o) {
       const Object& object = scene_.objects[o];
       const bool object_opaque = IsOpaque(scene_.materials[object.material], backfaces_);
-      for (uint32_t k = 0; k < object.index.size() / 3; ++k) {
+      for (uint32_t k = 0; k < object.index.size() / 3; ++k, ++number) {
+        const bool coincides = next != coincident.end() && next->number == number;
+        const uint32_t group = coincides ? (next++)->group : 0;
         Triangle triangle;
         triangle.object = o;
         if (!MakeTriangle(object, k, triangle)) continue;
-        if ((object_opaque && !IsNeedle(triangle)) == opaque) triangles_.push_back(triangle);
+        if ((object_opaque && !coincides && !IsNeedle(triangle)) != always_met) continue;
+        if (coincides) groups.emplace_back(group, triangles_.size());
+        triangles_.push_back(triangle);
       }
     }
-    if (opaque) opaque_count_ = static_cast<uint32_t>(triangles_.size());
+    if (always_met) opaque_count_ = static_cast<uint32_t>(triangles_.size());
   }
+  SortGroups(std::move(groups));
   Vec3d sum;
   for (const Triangle& t : triangles_) sum += ToDouble(t.p0) * 3.0 + ToDouble(t.e1) + ToDouble(t.e2);
   center_ = triangles_.empty() ? Vec3f{} : ToFloat(sum / (3.0 * static_cast<double>(triangles_.size())));
@@ -117,12 +125,16 @@ void World::SortByAlpha(bool look) {
       of_geometry_[kStops].push_back(k);
       continue;
     }
+    const auto members = MembersOf(GroupOf(k));
+    const bool hidden = GroupOf(k) != 0 && std::find(members.begin(), members.end(), k) == members.end();
+    if (hidden) continue;
     const auto [least, most] = look && has_alpha ? AlphaRange(t) : std::pair(0.0f, 1.0f);
     const bool mask = material.alpha_mode == AlphaMode::kMask;
     const bool passes = mask ? most < material.alpha_cutoff - kAlphaRounding : most <= 0;
-    const bool stops = mask ? least >= material.alpha_cutoff + kAlphaRounding : least >= 1;
-    const bool whole = stops && (backfaces_ != BackfaceMode::kPass || material.double_sided) && !IsNeedle(t);
-    opaque_alpha_.skipped += passes || whole ? 1 : 0;
+    const bool stops = !has_alpha || (mask ? least >= material.alpha_cutoff + kAlphaRounding : least >= 1);
+    const bool whole =
+        stops && (backfaces_ != BackfaceMode::kPass || material.double_sided) && !IsNeedle(t) && members.size() <= 1;
+    opaque_alpha_.skipped += has_alpha && (passes || whole) ? 1 : 0;
     if (!passes) of_geometry_[whole ? kStops : kAsks].push_back(k);
   }
 }
@@ -150,7 +162,7 @@ void World::AddGeometry(Geometry geometry_id) {
     const Triangle& t = triangles_[listed[k]];
     const Object& object = scene_.objects[t.object];
     for (size_t corner = 0; corner < 3; ++corner) {
-      const Vec3f p = object.position[object.index[3 * t.index_in_object + corner]];
+      const Vec3f p = CornerOf(object, t.index_in_object, corner);
       std::memcpy(vertices + 9 * k + 3 * corner, &p, sizeof p);
       indices[3 * k + corner] = static_cast<uint32_t>(3 * k + corner);
     }
@@ -187,26 +199,13 @@ void World::Filter(const RTCFilterFunctionNArguments* arguments) {
   if (*arguments->valid == 0) return;
   const auto* context = reinterpret_cast<const TraceContext*>(arguments->context);
   const auto* hit = reinterpret_cast<const RTCHit*>(arguments->hit);
-  const uint32_t triangle = context->world->TriangleOf(kAsks, hit->primID);
+  const World& world = *context->world;
+  const uint32_t triangle = world.TriangleOf(kAsks, hit->primID), group = world.GroupOf(triangle);
   const Ray& asked = *context->ray;
-  if (triangle == asked.from || triangle == asked.to ||
-      context->world->Passes(triangle, hit->u, hit->v, asked.dir, asked.key)) {
+  const auto is_here = [&](uint32_t end) { return triangle == end || (group != 0 && group == world.GroupOf(end)); };
+  if (is_here(asked.from) || is_here(asked.to) || !world.IsMet(triangle, hit->u, hit->v, asked.dir, asked.key)) {
     *arguments->valid = 0;
   }
-}
-
-bool World::Passes(uint32_t triangle, float u, float v, Vec3f dir, uint32_t key) const {
-  const Triangle& t = triangles_[triangle];
-  const Material& material = MaterialOf(t);
-  if (backfaces_ == BackfaceMode::kPass && !material.double_sided && Dot(dir, t.normal) > 0) return true;
-  if (material.alpha_mode == AlphaMode::kOpaque) return false;
-  float alpha = material.base_alpha;
-  if (material.base_texture.texture >= 0) {
-    const Vec2f uv = TexcoordAt(t, material.base_texture.texcoord, u, v);
-    alpha *= SampleAlpha(scene_.textures[material.base_texture.texture], material.base_texture, uv);
-  }
-  if (material.alpha_mode == AlphaMode::kMask) return alpha < material.alpha_cutoff;
-  return UnitFloat(HashCombine(key, triangle)) >= alpha;
 }
 
 namespace {
@@ -344,6 +343,12 @@ Rgb World::FrontEmissionAt(uint32_t triangle, float u, float v) const {
 Rgb World::EmissionAt(const Hit& hit) const {
   if (hit.back && !MaterialOf(triangles_[hit.triangle]).double_sided) return {};
   return FrontEmissionAt(hit.triangle, hit.u, hit.v);
+}
+
+Rgb World::GlowAt(uint32_t triangle, float u, float v, bool back) const {
+  if (back && !MaterialOf(triangles_[triangle]).double_sided) return {};
+  const float share = ShareMet(triangle, u, v, back);
+  return share > 0 ? FrontEmissionAt(triangle, u, v) * share : Rgb{};
 }
 
 }  // namespace bakewell

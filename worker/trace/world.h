@@ -5,11 +5,13 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/artifact/settings.h"
 #include "core/base/status.h"
 #include "core/scene/scene.h"
+#include "worker/trace/ray.h"
 
 struct RTCFilterFunctionNArguments;
 
@@ -24,35 +26,12 @@ struct Triangle {
   uint16_t material = 0;
 };
 
-inline constexpr uint32_t kNoTriangle = ~0u;
-
-struct Ray {
-  Vec3f origin;
-  Vec3f dir;                                      // unit
-  float t_max;                                    // [m], infinity allowed
-  uint32_t key = 0;                               // decides what a BLEND surface lets through
-  uint32_t from = kNoTriangle, to = kNoTriangle;  // the triangles that it starts and ends on, if any: never hit
-};
-
-// The first surface along a ray; triangle == kNoTriangle where there is none.
-struct Hit {
-  uint32_t triangle = kNoTriangle;
-  float t = 0;         // [m]
-  float u = 0, v = 0;  // barycentrics of e1 and e2
-  bool back = false;   // the ray meets the back side
-  explicit operator bool() const { return triangle != kNoTriangle; }
-};
-
-// A point to start rays from, on one side of a triangle.
-struct SurfacePoint {
-  Vec3f position;
-  Vec3f normal;      // unit, geometric, on the side that is meant
-  float offset = 0;  // how far along `normal` a ray must start to miss its own surface [m]
-  uint32_t triangle = kNoTriangle;
-};
-
 // The scene as Embree sees it. Immutable after Build and safe to trace from any number of threads. Degenerate and
 // non-finite triangles are left out. Same scene, same hits: one build thread, ISA pinned to AVX2, robust intersection.
+//
+// Of triangles that coincide (the same three corners, bit for bit) a ray meets the first that stops it, in this order:
+// fronts (and both sides of doubleSided materials) before backs, greater emission factor before less, then the scene's
+// order.
 class World {
  public:
   static absl::StatusOr<std::unique_ptr<World>> Build(const Scene& scene, BackfaceMode backfaces, float albedo_limit,
@@ -84,8 +63,12 @@ class World {
   Rgb AlbedoAt(const Hit& hit) const;
   // Emitted radiance towards the ray [W m^-2 sr^-1]: the front, and the back of doubleSided materials.
   Rgb EmissionAt(const Hit& hit) const;
-  // Radiance emitted by the front of a triangle at barycentrics (u, v).
-  Rgb FrontEmissionAt(uint32_t triangle, float u, float v) const;
+  // The share of the rays to one side of a triangle at barycentrics (u, v) that meet it: less than 1 where alpha lets
+  // rays pass or a triangle that coincides comes first.
+  float ShareMet(uint32_t triangle, float u, float v, bool back) const;
+  bool IsAlwaysMet(uint32_t triangle) const { return triangle < opaque_count_; }  // ShareMet is 1 everywhere
+  // Mean radiance that those rays find: EmissionAt by ShareMet.
+  Rgb GlowAt(uint32_t triangle, float u, float v, bool back) const;
   bool Emits(uint32_t triangle) const;
 
  private:
@@ -93,6 +76,8 @@ class World {
   struct TraceContext;
   World(const Scene& scene, BackfaceMode backfaces, float albedo_limit);
   absl::Status BuildTriangles();
+  // `triangles`: all that coincide with others, by group.
+  void SortGroups(std::vector<std::pair<uint32_t, uint32_t>> triangles);
   void SortByAlpha(bool look);
   absl::Status BuildDevice();
   enum Geometry : uint8_t { kStops, kAsks };
@@ -102,31 +87,35 @@ class World {
     return geometry == kStops && primitive < opaque_count_ ? primitive : of_geometry_[geometry][primitive];
   }
   static void Filter(const RTCFilterFunctionNArguments* arguments);
-  bool Passes(uint32_t triangle, float u, float v, Vec3f dir, uint32_t key) const;
+  // Triangles that coincide are one group; 0 is that of all which do with none, and empty.
+  uint32_t GroupOf(uint32_t triangle) const {
+    return triangle < opaque_count_ || triangle == kNoTriangle ? 0 : group_of_[triangle - opaque_count_];
+  }
+  std::span<const uint32_t> MembersOf(uint32_t group) const {
+    return std::span(member_).subspan(group_begin_[group], group_begin_[group + 1] - group_begin_[group]);
+  }
+  template <typename Visit>
+  void VisitBefore(uint32_t triangle, float u, float v, bool back, Visit visit) const;
+  float OpacityAt(uint32_t triangle, float u, float v, bool back) const;
+  bool Stops(uint32_t triangle, float u, float v, bool back, uint32_t key) const;
+  bool IsMet(uint32_t triangle, float u, float v, Vec3f dir, uint32_t key) const;
+  Rgb FrontEmissionAt(uint32_t triangle, float u, float v) const;
   Vec2f TexcoordAt(const Triangle& triangle, int set, float u, float v) const;
 
   const Scene& scene_;
   BackfaceMode backfaces_;
   float albedo_limit_;
-  std::vector<Triangle> triangles_;  // those of opaque materials first
+  std::vector<Triangle> triangles_;  // those that are always met first
   uint32_t opaque_count_ = 0;
-  // What Embree gets: triangles that stop every ray, those that Filter is asked about. What lets all rays pass is in
-  // neither.
+  // What Embree gets: triangles that stop every ray, those that Filter is asked about. What lets all rays pass or is
+  // never met is in neither.
   std::array<std::vector<uint32_t>, 2> of_geometry_;
   SkipCount opaque_alpha_;
+  std::vector<uint32_t> group_of_;                 // one per triangle from opaque_count_ on
+  std::vector<uint32_t> member_, group_begin_{0};  // without those that are never met
   Vec3f center_;
   float radius_ = 0;
   std::unique_ptr<Device> device_;
 };
-
-// Where a ray that leaves `point` along its side's normal starts. The offset is an error bound of the position and of
-// the intersection (Wächter & Binder 2019, "A Fast and Robust Method for Avoiding Self-Intersection"), relative to the
-// triangle's coordinates: no absolute epsilon.
-// Needles, whose plane rounding tilts by more than that, are told apart by number (Ray::from).
-inline Vec3f RayOrigin(const SurfacePoint& point) { return point.position + point.normal * point.offset; }
-
-inline Ray RayFrom(const SurfacePoint& point, Vec3f dir, float t_max, uint32_t key) {
-  return {RayOrigin(point), dir, t_max, key, point.triangle};
-}
 
 }  // namespace bakewell

@@ -90,6 +90,15 @@ TEST(SceneBytes, WithANumberThatIsNoneInAnyFieldAreRefused) {
   }
 }
 
+TEST(Settings, WithASkyBeyondWhatVariancesHoldAreRefused) {
+  BakeSettings settings;
+  settings.environment = Environment{};
+  settings.environment->radiance = {0, 1e15f, 0};
+  EXPECT_TRUE(ValidateSettings(settings).ok());
+  settings.environment->radiance = {0, 3e19f, 0};
+  EXPECT_EQ(ValidateSettings(settings).code(), absl::StatusCode::kInvalidArgument);
+}
+
 TEST(Settings, WithANumberThatIsNoneAreRefused) {
   BakeSettings settings;
   settings.environment = Environment{};

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tests/property/stability/stress.h"
+#include "worker/level/report.h"
 
 // Lights at the ends of what a level may hold.
 namespace bakewell {
@@ -90,6 +91,23 @@ TEST(Intensity, OfAnyMagnitudeGivesTheSameLight) {
   for (const float intensity : {1e-15f, 1e-8f, 1e8f, 1e15f}) {
     EXPECT_NEAR(MeanOverIntensity(intensity) / one, 1, 1e-4) << intensity;
   }
+}
+
+// Symptom: variances were infinite or NaN, sampling stopped after the first round or never, and nothing was said.
+TEST(Intensity, BeyondWhatVariancesHoldIsCountedAndFails) {
+  SceneBuilder builder({16, 16});
+  builder.AddRoom({0, 0, 0}, {3, 3, 3}, {.material = 0, .page = {0, 0, 16, 16}});
+  builder.AddPointLight({1, 2, 1}, Grey(3e19));
+  const BakedScene baked = BakeSceneInMemory(builder.Build(), {});
+  for (const TexelLight& light : baked.lights()) {
+    ASSERT_TRUE(IsFinite(light.irradiance) && IsFinite(light.variance)) << light.variance.x;
+  }
+  EXPECT_GT(baked.baked.counters.bad_samples, 0);
+  BakeTally tally;
+  tally.Count(baked.baked.counters);
+  const auto report = tally.Finish({}, 0, {});
+  ASSERT_EQ(report.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_NE(report.status().message().find("above 1e+18"), std::string::npos) << report.status();
 }
 
 TEST(LightNearASurface, TexelsBesideItFollowTheClosedForm) {

@@ -43,7 +43,7 @@ TEST(ValidateSettings, ABadEnvironmentPixelIsLocated) {
   environment.type = EnvironmentType::kLatLong;
   environment.width = environment.height = 2;
   environment.latlong = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, kNan, 1}};
-  EXPECT_EQ(ValidateSettings(settings).message(), "environment pixel (1, 1) is negative or not finite");
+  EXPECT_EQ(ValidateSettings(settings).message(), "environment pixel (1, 1) is negative, not finite or above 1e+15");
 }
 
 }  // namespace

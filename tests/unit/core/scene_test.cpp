@@ -94,6 +94,22 @@ TEST(SceneBytes, NumbersThatAreNotFiniteAreDataLoss) {
   EXPECT_EQ(ParseScene(SerializeScene(scene)).status().code(), absl::StatusCode::kDataLoss);
 }
 
+TEST(SceneBytes, LightBeyondWhatVariancesHoldIsDataLoss) {
+  for (int what = 0; what < 4; ++what) {
+    for (const float bad : {1.1e15f, 3e19f, -1.0f}) {
+      Scene scene = RichScene();
+      scene.environment.latlong = {{1, 1, 1}};
+      scene.environment.width = scene.environment.height = 1;
+      Rgb* const lights[] = {&scene.lights[0].intensity, &scene.materials[0].emission, &scene.environment.zenith,
+                             &scene.environment.latlong[0]};
+      lights[what]->y = 1e15f;
+      EXPECT_TRUE(ParseScene(SerializeScene(scene)).ok()) << what;
+      lights[what]->y = bad;
+      EXPECT_EQ(ParseScene(SerializeScene(scene)).status().code(), absl::StatusCode::kDataLoss) << what << ", " << bad;
+    }
+  }
+}
+
 TEST(Canonicalize, OrderOfTheInputChangesNothing) {
   const Scene scene = RichScene();
   Scene shuffled = scene;

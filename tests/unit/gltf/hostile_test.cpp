@@ -229,7 +229,14 @@ const Attack kAttacks[] = {
      [](GltfBuilder& b) {
        UseMaterial(b, {{"name", "m"}, {"emissiveFactor", {-1, 0, 0}}});
      },
-     "materials[0] \"m\": emissiveFactor is negative"},
+     "materials[0] \"m\": its emission is negative"},
+    {"blinding emission",
+     [](GltfBuilder& b) {
+       UseMaterial(b, {{"name", "m"},
+                       {"emissiveFactor", {1, 0, 0}},
+                       {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 3e19}}}}}});
+     },
+     "materials[0] \"m\": its emission, 3e+19, is above 1e+15"},
     {"huge emission",
      [](GltfBuilder& b) {
        UseMaterial(b, {{"emissiveFactor", {1e30, 0, 0}},
@@ -251,6 +258,11 @@ const Attack kAttacks[] = {
        UseLight(b, {{"type", "point"}, {"intensity", -1}, {"name", "x"}});
      },
      "lights[0] \"x\": its colour times intensity is negative"},
+    {"blinding light",
+     [](GltfBuilder& b) {
+       UseLight(b, {{"type", "point"}, {"intensity", 3e19}, {"name", "x"}});
+     },
+     "lights[0] \"x\": its colour times intensity, 3e+19, is above 1e+15"},
     {"light type",
      [](GltfBuilder& b) {
        UseLight(b, {{"type", "tube"}});
@@ -277,6 +289,11 @@ const Attack kAttacks[] = {
        b.json["scenes"][0]["extras"]["environment"] = {{"type", "constant"}, {"radiance", {0, -1, 0}}};
      },
      "radiance is negative"},
+    {"environment blinding",
+     [](GltfBuilder& b) {
+       b.json["scenes"][0]["extras"]["environment"] = {{"type", "constant"}, {"radiance", {0, 1e16, 0}}};
+     },
+     "radiance, 1e+16, is above 1e+15"},
     {"page",
      [](GltfBuilder& b) {
        b.json["scenes"][0]["extras"]["lightmap"] = {{"width", 0}, {"height", 1}};

@@ -251,6 +251,17 @@ TEST_F(StoreTest, LinkedBlobOutlivesItsOwn) {
   EXPECT_EQ(bytes, "hello");
 }
 
+TEST_F(StoreTest, LinkedBlobToAnotherFileSystemIsRefusedAndStays) {
+  const TempDir memory("/dev/shm"), disk;
+  const TempDir& elsewhere = OnOneFileSystem(memory, dir) ? disk : memory;
+  if (OnOneFileSystem(elsewhere, dir)) GTEST_SKIP() << "/dev/shm and the folder for files that pass are one";
+  OpenAll();
+  const Digest digest = PutBlob("hello");
+  EXPECT_EQ(blobs->Link(digest, elsewhere / "linked").code(), absl::StatusCode::kUnavailable);
+  EXPECT_TRUE(fs::is_empty(elsewhere.path()));
+  EXPECT_EQ(blobs->Get(digest).value(), "hello");
+}
+
 TEST_F(StoreTest, MoreBytesThanDeclaredAreRefused) {
   OpenAll();
   const auto upload = blobs->StartUpload(Sha256Of("abc"), 2);
