@@ -9,14 +9,11 @@ import numpy as np
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "converge", "scenes"))
 import mesh as scene_mesh  # noqa: E402
+from mesh import unit  # noqa: E402
 
 DARK = {"type": "constant", "radiance": [0, 0, 0]}
 BLUE_SKY = {"type": "gradient", "zenith": [0.3, 0.5, 1.0], "horizon": [1.0, 1.0, 1.0], "ground": [0.1, 0.1, 0.1]}
 SUN = {"color": [1.0, 0.95, 0.85], "extras": {"angularDiameterDeg": 0.53}}
-
-
-def unit(v):
-    return np.asarray(v, float) / np.linalg.norm(v)
 
 
 def rotation(rng):
@@ -60,12 +57,8 @@ class Level:
             self.material(f"m{k}", rng.uniform(*albedo, 3))
 
     def material(self, name, albedo, emission=None, double_sided=False):
-        out = {"name": name, "doubleSided": double_sided,
-               "pbrMetallicRoughness": {"baseColorFactor": [*map(float, albedo), 1.0], "metallicFactor": 0.0}}
-        if emission is not None:
-            out.update(emissiveFactor=[e / max(emission) for e in emission],
-                       extensions={"KHR_materials_emissive_strength": {"emissiveStrength": float(max(emission))}})
-        self.materials[name] = out
+        light = {} if emission is None else {"emission": emission}
+        self.materials[name] = {**scene_mesh.gltf_material(name, {"albedo": [float(a) for a in albedo], **light}), "doubleSided": double_sided}
 
     def some(self):
         return f"m{self.rng.integers(1, 6)}"
@@ -99,13 +92,7 @@ class Level:
     def room(self, size):
         self.box("m0", [0, size[1] / 2, 0], size, inward=True)
 
-    def light(self, kind, position=None, direction=None, **light):
-        node = {"name": f"{kind}{len(self.lights)}", "extensions": {"KHR_lights_punctual": {"light": len(self.lights)}}}
-        if position is not None:
-            node["translation"] = [float(x) for x in position]
-        if direction is not None:
-            node["rotation"] = scene_mesh.rotation_from_minus_z(unit(direction))
-        self.lights.append((node, {"type": kind, **light}))
+    light = scene_mesh.Mesh.light
 
     def write(self, path):
         names, chunks, accessors, primitives = sorted(self.parts), [], [], []

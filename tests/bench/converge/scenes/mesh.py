@@ -22,7 +22,7 @@ def length(a):
 
 
 def unit(a):
-    return a / length(a)
+    return np.asarray(a, float) / length(a)
 
 
 class Mesh:
