@@ -12,19 +12,24 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Mean radiance of a triangle and its sides that glow: over a fixed 8 x 8 pattern of the low-distortion map where it is
-// not the same everywhere.
+// Mean radiance of a triangle and its sides that glow: over a fixed pattern of the low-distortion map where it is not
+// the same everywhere, as fine as the textures are (a lit window of a dark facade counts), up to 256 x 256.
 Rgb MeanRadiance(const World& world, uint32_t triangle) {
   const Material& material = world.MaterialOf(world.triangles()[triangle]);
   if (material.emission_texture.texture < 0 && world.IsAlwaysMet(triangle)) return material.emission;
+  const float texels = world.GlowTexelsAcross(triangle);
+  const int side = texels > 8 ? static_cast<int>(std::min(texels, 256.0f)) : 8;
   const int sides = material.double_sided ? 2 : 1;
+  const float step = 1.0f / static_cast<float>(side);
   Rgb sum;
-  for (int i = 0; i < 64; ++i) {
-    const Vec2f b =
-        TriangleFromSquare({(static_cast<float>(i % 8) + 0.5f) / 8, (static_cast<float>(i / 8) + 0.5f) / 8});
-    for (int side = 0; side < sides; ++side) sum += world.GlowAt(triangle, b.x, b.y, side == 1);
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const Vec2f b =
+          TriangleFromSquare({(static_cast<float>(x) + 0.5f) * step, (static_cast<float>(y) + 0.5f) * step});
+      for (int k = 0; k < sides; ++k) sum += world.GlowAt(triangle, b.x, b.y, k == 1) * (step * step);
+    }
   }
-  return sum * (1.0f / static_cast<float>(64 * sides));
+  return sum / static_cast<float>(sides);
 }
 
 }  // namespace

@@ -340,6 +340,24 @@ Rgb World::FrontEmissionAt(uint32_t triangle, float u, float v) const {
          SampleColor(scene_.textures[material.emission_texture.texture], material.emission_texture, uv);
 }
 
+float World::GlowTexelsAcross(uint32_t triangle) const {
+  const Triangle& t = triangles_[triangle];
+  const Material& material = MaterialOf(t);
+  const auto across = [&](const TextureRef& ref) {
+    if (ref.texture < 0) return 0.0f;
+    const Texture& texture = scene_.textures[ref.texture];
+    const auto length = [&](Vec2f d) {
+      return std::hypot(d.x * ref.scale.x, d.y * ref.scale.y) *
+             static_cast<float>(std::max(texture.width, texture.height));
+    };
+    const Vec2f corner = TexcoordAt(t, ref.texcoord, 0, 0);
+    return std::max(length(TexcoordAt(t, ref.texcoord, 1, 0) - corner),
+                    length(TexcoordAt(t, ref.texcoord, 0, 1) - corner));
+  };
+  const float alpha = material.alpha_mode == AlphaMode::kOpaque ? 0 : across(material.base_texture);
+  return std::max(across(material.emission_texture), alpha);
+}
+
 Rgb World::EmissionAt(const Hit& hit) const {
   if (hit.back && !MaterialOf(triangles_[hit.triangle]).double_sided) return {};
   return FrontEmissionAt(hit.triangle, hit.u, hit.v);

@@ -70,6 +70,9 @@ class World {
   // Mean radiance that those rays find: EmissionAt by ShareMet.
   Rgb GlowAt(uint32_t triangle, float u, float v, bool back) const;
   bool Emits(uint32_t triangle) const;
+  // How many texels of the textures that say how it glows, emission and alpha, lie along a triangle's longer edge of e1
+  // and e2, about; 0 without textures.
+  float GlowTexelsAcross(uint32_t triangle) const;
 
  private:
   struct Device;

@@ -46,6 +46,25 @@ Scene ManyLights(uint32_t seed) {
   return builder.Build();
 }
 
+// Symptom: the one lit window of a facade fell between the 64 points that said how bright its triangles are, and all
+// its light was lost.
+TEST(LightSet, OneLitWindowOfAFacadeIsALight) {
+  constexpr int kSide = 64;
+  Texture texture{.width = kSide, .height = kSide, .rgba = std::vector<uint8_t>(4 * kSide * kSide, 0)};
+  for (size_t y = 21; y < 23; ++y) {
+    for (size_t x = 13; x < 15; ++x) std::fill_n(texture.rgba.begin() + 4 * (kSide * y + x), 3, uint8_t{255});
+  }
+  SceneBuilder builder;
+  Material material;
+  material.emission = {1000, 1000, 1000};
+  material.emission_texture.texture = builder.AddTexture(texture);
+  builder.AddQuad({0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {.material = builder.AddMaterial(material), .lightmapped = false});
+  const Lit lit(builder.Build());
+  float flux = 0;  // over pi [W m^-2 sr^-1 m^2]
+  for (const EmissiveTriangle& light : lit.lights->emissive()) flux += light.area * light.mean_radiance.x;
+  EXPECT_NEAR(flux, 1000 * 4 * 4.0f / (kSide * kSide), 1);
+}
+
 TEST(LightSet, SampleLocalsPdfIsPdfLocal) {
   const Lit lit(ManyLights(1));
   TestRandom random(2);
