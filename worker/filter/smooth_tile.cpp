@@ -1,5 +1,7 @@
 #include "worker/filter/smooth_tile.h"
 
+#include <utility>
+
 #include "worker/filter/connect.h"
 
 namespace bakewell {
@@ -10,6 +12,10 @@ SmoothTile::SmoothTile(const TexelMap& map, uint32_t begin, uint32_t end)
       end_(end),
       left_(map.texels[begin].x / kTileSide * kTileSide - SmoothGrid::kMostRadius),
       top_(map.texels[begin].y / kTileSide * kTileSide - SmoothGrid::kMostRadius) {}
+
+SmoothTile::SmoothTile(const SmoothTile& connected, Signal signal) : SmoothTile(connected) {
+  grid_ = SmoothGrid(std::move(grid_), signal);
+}
 
 // -1 where there is no texel.
 int32_t SmoothTile::TexelAt(int x, int y) const {

@@ -8,12 +8,14 @@
 
 namespace bakewell {
 
-// What the filter will make of one tile's texels, as far as the tile can tell: around it, as far as a window reaches,
-// lie places without values.
+// What the filter will make of one tile's texels, of their indirect light unless told otherwise, as far as the tile can
+// tell: around it, as far as a window reaches, lie places without values.
 class SmoothTile {
  public:
   // Texels [begin, end) of the map are the tile.
   SmoothTile(const TexelMap& map, uint32_t begin, uint32_t end);
+  // The same tile, connected, for another signal; before the first Put.
+  SmoothTile(const SmoothTile& connected, Signal signal);
 
   // Connects neighbours. valid, crowded (IsCrowded): one flag a texel of the tile. Returns ConnectTexel's bits, one
   // element a texel.
@@ -37,7 +39,7 @@ class SmoothTile {
   const TexelMap& map_;
   const uint32_t begin_, end_;
   int left_, top_;  // of the grid, on the page
-  SmoothGrid grid_{kTileSide + 2 * SmoothGrid::kMostRadius, kTileSide + 2 * SmoothGrid::kMostRadius};
+  SmoothGrid grid_{kTileSide + 2 * SmoothGrid::kMostRadius, kTileSide + 2 * SmoothGrid::kMostRadius, Signal::kIndirect};
 };
 
 }  // namespace bakewell

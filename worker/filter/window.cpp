@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kConfidence = 0.5;                   // half width of a confidence interval, in standard errors
+constexpr double kDirectConfidence = 0.25;            // likewise, of direct light
+constexpr double kFollowed = 2.5;                     // likewise, of a texel that follows its neighbours
 constexpr float kMostOverOwn = 4;                     // times a texel's own variance that its neighbours may make of it
 constexpr int kStrayRadius = 2;                       // of the window whose strays say how large the noise is
 constexpr double kLeastStrays = 9;                    // texels in it
@@ -338,7 +340,7 @@ void SmoothGrid::Take(int x, int y, const Calm& calm) {
   cell.stray = calm.stray;
 }
 
-float SmoothGrid::Choose(int x, int y, Steps* steps) const {
+float SmoothGrid::Reach(int x, int y, double confidence, float most, Steps* steps) const {
   Growth window(*this, x, y);
   double low = -kInfinity, high = kInfinity, overlap = 0, variance = kInfinity;
   for (int radius = 0;; ++radius) {
@@ -346,15 +348,20 @@ float SmoothGrid::Choose(int x, int y, Steps* steps) const {
     const double estimate = window.Estimate(weights);
     // A window that takes in noisier texels must not widen its interval: quiet texels keep away from them.
     variance = std::min(variance, window.Variance(weights));
-    const double reach = kConfidence * std::sqrt(variance);
+    const double reach = confidence * std::sqrt(variance);
     if (steps != nullptr) (*steps)[static_cast<size_t>(radius)] = window.Result(weights, estimate);
     low = std::max(low, estimate - reach);
     high = std::min(high, estimate + reach);
     const double before = overlap;
     overlap = high - low;
-    if (overlap < 0) return static_cast<float>(radius - 1 + before / (before - overlap));
-    if (radius == kMostRadius || !(window.mean_variance() > 0) || !window.Grow()) return static_cast<float>(radius);
+    if (overlap < 0) return std::min(most, static_cast<float>(radius - 1 + before / (before - overlap)));
+    if (static_cast<float>(radius) >= most) return most;
+    if (!(window.mean_variance() > 0) || !window.Grow()) return static_cast<float>(radius);
   }
+}
+
+float SmoothGrid::Choose(int x, int y, Steps* steps) const {
+  return Reach(x, y, signal_ == Signal::kDirect ? kDirectConfidence : kConfidence, kMostRadius, steps);
 }
 
 float SmoothGrid::Agree(int x, int y) const {
@@ -372,7 +379,8 @@ float SmoothGrid::Agree(int x, int y) const {
   const float median = radii[(count - 1) / 2];
   if (median <= cell.radius) return median;
   const float follows = std::clamp((kStraysMost - cell.stray) / (kStraysMost - kStraysByNoise), 0.0f, 1.0f);
-  return cell.radius + follows * (median - cell.radius);
+  const float radius = cell.radius + follows * (median - cell.radius);
+  return signal_ == Signal::kIndirect ? radius : std::max(cell.radius, Reach(x, y, kFollowed, radius, nullptr));
 }
 
 SmoothGrid::Window SmoothGrid::WindowOf(int x, int y, float radius) const {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace bakewell {
@@ -23,6 +24,10 @@ struct SmoothCell {
   float stray = 0;     // SmoothGrid::Calm
 };
 
+// What a grid's texels hold. Direct light has edges that its noise does not hide: the confidence intervals of its
+// windows are narrower, and a texel follows its neighbours' windows only as far as its own admit it.
+enum class Signal : uint8_t { kIndirect, kDirect };
+
 // A rectangle of texels with a noisy signal, and how far around each texel it may be averaged.
 //
 // A texel's estimate is a first-order regression over the square window around it, as far as connected texels reach.
@@ -33,8 +38,13 @@ class SmoothGrid {
  public:
   static constexpr int kMostRadius = 7;
 
-  SmoothGrid(int width, int height)
-      : width_(width), height_(height), cells_(static_cast<size_t>(width) * static_cast<size_t>(height)) {}
+  SmoothGrid(int width, int height, Signal signal)
+      : signal_(signal),
+        width_(width),
+        height_(height),
+        cells_(static_cast<size_t>(width) * static_cast<size_t>(height)) {}
+  // The same texels and connections for another signal.
+  SmoothGrid(SmoothGrid connected, Signal signal) : SmoothGrid(std::move(connected)) { signal_ = signal; }
 
   SmoothCell& At(int x, int y) { return cells_[Place(x, y)]; }
   const SmoothCell& At(int x, int y) const { return cells_[Place(x, y)]; }
@@ -78,7 +88,7 @@ class SmoothGrid {
 
   // The median of the radii of a texel and its neighbours (SmoothCell::radius): a texel that strays by more than its
   // interval, as some must, would otherwise keep to itself. One that strays farther than noise does (SmoothCell::stray)
-  // keeps to itself: it is a detail.
+  // keeps to itself: it is a detail. Of direct light no farther than wide intervals of its own go.
   float Agree(int x, int y) const;
 
   // What a window of `radius` gives; fills in the steps that it needs.
@@ -101,10 +111,14 @@ class SmoothGrid {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
   class Growth;
+  // The largest radius, up to `most`, whose estimate agrees with those of all smaller ones: their intervals, of
+  // `confidence` standard errors on either side, intersect.
+  float Reach(int x, int y, double confidence, float most, Steps* steps) const;
   void NumberParts();
   float PooledVariance(int x, int y) const;
   void AddWeights(const Growth& growth, int x, int y, float share, Window& window) const;
 
+  Signal signal_;
   int width_, height_;
   std::vector<SmoothCell> cells_;
 };

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstddef>
 #include <map>
+#include <utility>
 
 #include "worker/filter/window.h"
 
@@ -15,14 +16,18 @@ namespace {
 
 class PageFilter {
  public:
-  PageFilter(const TexelMap& map, int page, std::span<TexelLight> lights)
-      : map_(map), page_(page), lights_(lights), grid_(map.pages[page].width, map.pages[page].height) {
+  PageFilter(const TexelMap& map, int page, Signal signal, std::span<TexelLight> lights)
+      : map_(map),
+        page_(page),
+        signal_(signal),
+        lights_(lights),
+        grid_(map.pages[page].width, map.pages[page].height, signal) {
     for (const int32_t at : map.texel_at[page]) {
       if (at >= 0) texels_.push_back(static_cast<uint32_t>(at));
     }
   }
 
-  void Run(FilterCounters& counters) {
+  void Run(std::vector<bool>& filtered) {
     for (const uint32_t i : texels_) Put(i);
     grid_.MeasureRoom();
     std::vector<SmoothGrid::Calm> calm(texels_.size());
@@ -39,7 +44,7 @@ class PageFilter {
     for (size_t k = 0; k < texels_.size(); ++k) {
       if (changed[k] == 0) continue;
       Replace(lights_[texels_[k]], smooth[k]);
-      ++counters.filtered;
+      filtered[texels_[k]] = true;
     }
   }
 
@@ -55,14 +60,24 @@ class PageFilter {
     return i < 0 ? nullptr : &lights_[i];
   }
 
+  // Luminance of the part that is filtered.
+  float ValueOf(const TexelLight& light) const {
+    const float indirect = Luminance(light.indirect.irradiance);
+    return signal_ == Signal::kIndirect ? indirect : Luminance(light.irradiance) - indirect;
+  }
+
+  Rgb VarianceOf(const TexelLight& light) const {
+    return signal_ == Signal::kIndirect ? light.indirect.variance : light.direct_variance;
+  }
+
   void Put(uint32_t i) {
     const Texel& texel = map_.texels[i];
     const TexelLight& light = lights_[i];
     if (!light.valid) return;
     SmoothCell& cell = grid_.At(texel.x, texel.y);
     cell.known = true;
-    cell.value = Luminance(light.indirect.irradiance);
-    cell.variance = Luminance(light.indirect.variance);
+    cell.value = ValueOf(light);
+    cell.variance = Luminance(VarianceOf(light));
     for (int k = 0; k < 4; ++k) {
       if (!(light.open >> k & 1)) continue;
       const TexelLight* other = LightAt(texel.x + kNeighbours[k][0], texel.y + kNeighbours[k][1]);
@@ -70,10 +85,16 @@ class PageFilter {
     }
   }
 
-  // A part's numbers side by side, of which the last three are its variance.
+  // The numbers of a part, or of the whole, side by side; the last three are its variance.
   static constexpr size_t kNumbers = 33, kVariance = 30, kWide = 32;
   using Numbers = std::array<float, kNumbers>;
-  static_assert(sizeof(LightPart) == sizeof(Numbers) && offsetof(LightPart, variance) == kVariance * sizeof(float));
+  static_assert(sizeof(LightPart) == sizeof(Numbers) && offsetof(LightPart, variance) == kVariance * sizeof(float) &&
+                offsetof(TexelLight, variance) == kVariance * sizeof(float));
+
+  // Four registers' worth; what is wrong at the end is put right by the caller.
+  static void AddWeighted(const float* numbers, float weight, Numbers& sum) {
+    for (size_t k = 0; k < kWide; ++k) sum[k] += numbers[k] * weight;
+  }
 
   bool Smooth(const Texel& texel, LightPart& result) const {
     if (!grid_.At(texel.x, texel.y).known) return false;
@@ -81,18 +102,19 @@ class PageFilter {
     const int radius = window.radius;
     if (radius == 0) return false;
     Numbers sum{};
-    std::array<float, 3> variance{};
+    Rgb variance;
     for (int dy = -radius; dy <= radius; ++dy) {
       for (int dx = -radius; dx <= radius; ++dx) {
         const float weight = window.At(dx, dy);
         if (weight == 0) continue;
-        const float* const light = &LightAt(texel.x + dx, texel.y + dy)->indirect.irradiance.x;
-        for (size_t k = 0; k < kWide; ++k) sum[k] += light[k] * weight;  // four registers; the end is put right below
-        for (size_t k = 0; k < 3; ++k) variance[k] += light[kVariance + k] * (weight * weight);
+        const TexelLight& light = *LightAt(texel.x + dx, texel.y + dy);
+        if (signal_ == Signal::kDirect) AddWeighted(&light.irradiance.x, weight, sum);
+        AddWeighted(&light.indirect.irradiance.x, signal_ == Signal::kDirect ? -weight : weight, sum);
+        variance += VarianceOf(light) * (weight * weight);
       }
     }
-    std::copy(variance.begin(), variance.end(), sum.begin() + kVariance);
     result = std::bit_cast<LightPart>(sum);
+    result.variance = variance;
     return std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) >= 0;
   }
 
@@ -105,7 +127,7 @@ class PageFilter {
     for (size_t k = 0; k < texels_.size(); ++k) {
       if (changed[k] == 0) continue;
       Sum& sum = charts[map_.texels[texels_[k]].chart];
-      sum.before += static_cast<double>(Luminance(lights_[texels_[k]].indirect.irradiance));
+      sum.before += static_cast<double>(ValueOf(lights_[texels_[k]]));
       sum.after += static_cast<double>(Luminance(smooth[k].irradiance));
     }
     for (size_t k = 0; k < texels_.size(); ++k) {
@@ -119,16 +141,24 @@ class PageFilter {
     }
   }
 
-  static void Replace(TexelLight& light, const LightPart& smooth) {
-    const LightPart before = light.indirect;
-    light.indirect = smooth;
+  void Replace(TexelLight& light, const LightPart& smooth) const {
+    light.variance += smooth.variance - VarianceOf(light);
+    if (signal_ == Signal::kDirect) {
+      light.irradiance = smooth.irradiance + light.indirect.irradiance;
+      for (size_t c = 0; c < kShCoefficients; ++c) {
+        light.sh.lambda[c] = smooth.sh.lambda[c] + light.indirect.sh.lambda[c];
+      }
+      light.direct_variance = smooth.variance;
+      return;
+    }
+    const LightPart before = std::exchange(light.indirect, smooth);
     light.irradiance += smooth.irradiance - before.irradiance;
     for (size_t c = 0; c < kShCoefficients; ++c) light.sh.lambda[c] += smooth.sh.lambda[c] - before.sh.lambda[c];
-    light.variance += smooth.variance - before.variance;
   }
 
   const TexelMap& map_;
   const int page_;
+  const Signal signal_;
   const std::span<TexelLight> lights_;
   SmoothGrid grid_;
   std::vector<uint32_t> texels_;
@@ -137,7 +167,12 @@ class PageFilter {
 }  // namespace
 
 void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, FilterCounters& counters) {
-  PageFilter(map, page, lights).Run(counters);
+  std::vector<bool> filtered(lights.size(), false);
+  const bool noisy = std::any_of(lights.begin(), lights.end(),
+                                 [](const TexelLight& light) { return MaxComponent(light.direct_variance) > 0; });
+  if (noisy) PageFilter(map, page, Signal::kDirect, lights).Run(filtered);
+  PageFilter(map, page, Signal::kIndirect, lights).Run(filtered);
+  counters.filtered += std::count(filtered.begin(), filtered.end(), true);
 }
 
 }  // namespace bakewell

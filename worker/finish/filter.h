@@ -10,9 +10,10 @@ struct FilterCounters {
   int64_t filtered = 0;  // texels whose window is more than themselves
 };
 
-// Smooths the indirect light of one page's texels (worker/filter/window.h), never with invalid ones; elements as in
-// TexelMap::texels, of which those of other pages are left alone. Irradiance and all SH coefficients get the same
-// weights, and every chart keeps its sum, so that what is smoothed away is not lost.
+// Smooths the direct and the indirect light of one page's texels, each by windows of its own (worker/filter/window.h),
+// never with invalid ones; elements as in TexelMap::texels, of which those of other pages are left alone. Irradiance
+// and all SH coefficients get the same weights, and every chart keeps its sum, so that what is smoothed away is not
+// lost.
 void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, FilterCounters& counters);
 
 }  // namespace bakewell

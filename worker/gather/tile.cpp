@@ -1,15 +1,14 @@
 #include "worker/gather/tile.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "worker/filter/smooth_tile.h"
-#include "worker/gather/allot.h"
-#include "worker/gather/noise.h"
+#include "worker/gather/budget.h"
 #include "worker/gather/skip.h"
 #include "worker/gather/work.h"
 #include "worker/sample/sobol.h"
@@ -20,14 +19,9 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kCulledShare = 0.1f;  // of the target error of the tile's dimmest texel
-constexpr float kGatherCost = 2.5f;   // of a gather ray and what it meets, over a light sample
-constexpr float kBoundless = 1e30f;   // error of what tolerates none
-constexpr float kMargin = static_cast<float>(SetNoise::kMargin);  // what is reported is safe, what stops is likely
-constexpr uint32_t kGuidedFrom = 16;                              // samples; for fewer a guide costs more than it gains
-constexpr float kChangedShare = 0.25f;                            // of a tile's texels; fewer leave the rest as it is
-constexpr size_t kTellingSets = 32;                               // fewer sets of a tile say little about all
-constexpr int64_t kWorthLeavingOut = 64;                          // texels; fewer cost less than the audit
+constexpr float kCulledShare = 0.1f;      // of the target error of the tile's dimmest texel
+constexpr uint32_t kGuidedFrom = 16;      // samples; for fewer a guide costs more than it gains
+constexpr int64_t kWorthLeavingOut = 64;  // texels; fewer cost less than the audit
 
 using Work = TexelWork;
 
@@ -44,13 +38,9 @@ class TileGatherer {
     if (options_.filter) Connect();
     for (Work& work : work_) work.direct_active = work.has_direct;
     for (Work& work : work_) work.indirect_active = work.has_indirect;
-    CorrectVariances();
-    Decide();
+    budget_.Decide(work_);
     KeepFound();
-    while (Round()) {
-      CorrectVariances();
-      Decide();
-    }
+    while (Round()) budget_.Decide(work_);
     std::vector<TexelLight> result;
     for (const Work& work : work_) result.push_back(work.Finish());
     return result;
@@ -90,7 +80,7 @@ class TileGatherer {
 
   // Texels that no light reaches, but for those that are audited.
   void LeaveOutDark() {
-    const PhotonDarkness darkness(scene_.cells, scene_.cache, Tolerated(0), options_.photon_flux);
+    const PhotonDarkness darkness(scene_.cells, scene_.cache, budget_.Tolerated(0), options_.photon_flux);
     std::vector<bool> dark;
     for (const Work& work : work_) dark.push_back(!lit_ || darkness.Covers(work.sampler));
     const std::vector<bool> audited = DrawAudit(Keys(), dark);
@@ -106,31 +96,11 @@ class TileGatherer {
     return static_cast<uint32_t>(work.crowded ? std::max(options_.min_samples, kBlocks) : options_.min_samples);
   }
 
-  std::vector<bool> Valid() const {
-    std::vector<bool> valid;
-    for (const Work& work : work_) valid.push_back(work.valid);
-    return valid;
-  }
-
-  std::vector<bool> Crowded() const {
-    std::vector<bool> crowded;
-    for (const Work& work : work_) crowded.push_back(work.crowded);
-    return crowded;
-  }
-
   std::vector<uint32_t> Keys() const {
     std::vector<uint32_t> keys;
     for (const Work& work : work_) keys.push_back(work.key);
     return keys;
   }
-
-  // What errors in this irradiance are measured in: between equal absolute and equal relative errors, for what matters
-  // to the root mean square and to the eye.
-  float Weighing(float irradiance) const {
-    const float mean = options_.mean_irradiance;
-    return std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
-  }
-  float Tolerated(float irradiance) const { return options_.target_error * Weighing(irradiance); }
 
   // Rays over the hemisphere, which also say which texels are valid; then lights.
   // False where texels that were to be left out have light.
@@ -201,7 +171,6 @@ class TileGatherer {
       if (work.direct_active) DirectRound(work, direct, 2 * direct);
       if (work.indirect_active && !work.guided && indirect >= kGuidedFrom) Guide(work);
       if (work.indirect_active) IndirectRound(work, indirect, 2 * indirect);
-      changed_ += work.indirect_active ? 1 : 0;
       any = any || work.direct_active || work.indirect_active;
     }
     return any;
@@ -311,98 +280,15 @@ class TileGatherer {
     work.indirect.AddSh(ray.dir, radiance / pdf);
   }
 
-  // Which of its neighbours each texel is connected to, on the grid and for the page's filter.
+  // Which of its neighbours each texel is connected to, for the tile's budget and for the page's filter.
   void Connect() {
-    const std::vector<uint8_t> open =
-        smooth_.emplace(map_, begin_, end_).Connect(scene_.world, Valid(), Crowded(), counters_.filter_rays);
+    std::vector<bool> valid, crowded;
+    for (const Work& work : work_) valid.push_back(work.valid);
+    for (const Work& work : work_) crowded.push_back(work.crowded);
+    SmoothTile tile(map_, begin_, end_);
+    const std::vector<uint8_t> open = tile.Connect(scene_.world, valid, crowded, counters_.filter_rays);
     for (size_t i = 0; i < work_.size(); ++i) work_[i].open = open[i];
-  }
-
-  // Every texel's indirect luminance and its variance after filtering, as far as this tile can tell.
-  std::vector<SmoothGrid::Smoothed> SmoothIndirect(const std::vector<float>& variance) {
-    for (size_t i = 0; i < work_.size(); ++i) {
-      const Work& work = work_[i];
-      if (work.valid) smooth_->Put(i, Luminance(work.indirect.Irradiance()), variance[i]);
-    }
-    return smooth_->Smooth();
-  }
-
-  // How far the sets that took part in the last round are better than their blocks say.
-  void CorrectVariances() {
-    SetNoise direct, indirect;
-    for (const Work& work : work_) {
-      if (!work.valid) continue;
-      if (work.direct_active) direct.Add(work.direct, Weighing(Luminance(work.direct.Irradiance())));
-      if (work.indirect_active) indirect.Add(work.indirect, Weighing(Luminance(work.indirect.Irradiance())));
-    }
-    for (Work& work : work_) {
-      if (work.direct_active && work.direct_samples >= kBlocks && direct.sets() >= kTellingSets)
-        work.direct_correction = direct.Correction();
-      if (work.indirect_active && work.indirect_samples >= kBlocks && indirect.sets() >= kTellingSets)
-        work.indirect_correction = indirect.Correction();
-    }
-  }
-
-  // Who takes part in the next round.
-  void Decide() {
-    std::vector<float> direct, indirect, light;
-    std::vector<int> direct_samples, indirect_samples;
-    for (const Work& work : work_) {
-      direct.push_back(Luminance(work.DirectVariance()));
-      indirect.push_back(Luminance(work.IndirectVariance()));
-      direct_samples.push_back(work.direct_samples);
-      indirect_samples.push_back(work.indirect_samples);
-      light.push_back(Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance()));
-    }
-    std::vector<bool> valid = Valid();
-    valid_ = static_cast<size_t>(std::count(valid.begin(), valid.end(), true));
-    const TilePool pool(map_, begin_, std::move(valid));
-    const std::vector<float> pooled_direct = pool.Variance(direct, direct_samples);
-    std::vector<float> pooled_indirect = pool.Variance(indirect, indirect_samples);
-    // A stray sample must not raise its own tolerance: neighbours or the smoothed light judge.
-    const std::vector<Claim> unfiltered = Claims(pooled_direct, pooled_indirect, pool.Mean(light));
-    if (!options_.filter || options_.target_error <= 0 || IsMet(unfiltered, valid_)) return Grant(unfiltered);
-    if (smoothed_.empty() || changed_ > kChangedShare * static_cast<float>(work_.size())) {
-      smoothed_ = SmoothIndirect(indirect);
-      changed_ = 0;
-    }
-    for (size_t i = 0; i < work_.size(); ++i) {
-      // What the window's texels say of their variance may have missed what is rare.
-      const float filtered = std::max(smoothed_[i].variance, smoothed_[i].square * pooled_indirect[i]);
-      pooled_indirect[i] = std::min(pooled_indirect[i], filtered);
-      light[i] = Luminance(work_[i].direct.Irradiance()) + smoothed_[i].value;
-    }
-    Grant(Claims(pooled_direct, pooled_indirect, light));
-  }
-
-  // By variances and irradiance a texel; two for each, of direct and of indirect light.
-  std::vector<Claim> Claims(const std::vector<float>& direct, const std::vector<float>& indirect,
-                            const std::vector<float>& light) const {
-    std::vector<Claim> claims;
-    claims.reserve(2 * work_.size());
-    for (size_t i = 0; i < work_.size(); ++i) {
-      const Work& work = work_[i];
-      const float tolerated = Tolerated(light[i]);
-      const auto claim = [&](bool has, int samples, float cost, float variance) {
-        const float error = variance > 0 ? std::min(variance / (kMargin * tolerated * tolerated), kBoundless) : 0;
-        const int doublings = has ? std::bit_width(static_cast<unsigned>(options_.max_samples / samples)) - 1 : 0;
-        claims.push_back({has ? error : 0, cost * static_cast<float>(samples), doublings});
-      };
-      const float missed = work.Missed(light[i]);
-      claim(work.has_direct, work.direct_samples, 1, std::max(direct[i], missed * missed));
-      claim(work.has_indirect, work.indirect_samples, kGatherCost, indirect[i]);
-    }
-    return claims;
-  }
-
-  // Makes active who gets more samples: without a target everybody.
-  void Grant(const std::vector<Claim>& claims) {
-    const std::vector<bool> granted =
-        options_.target_error > 0 ? Allot(claims, valid_) : std::vector<bool>(claims.size(), true);
-    for (size_t i = 0; i < work_.size(); ++i) {
-      work_[i].direct_active = claims[2 * i].doublings > 0 && granted[2 * i];
-      work_[i].indirect_active = claims[2 * i + 1].doublings > 0 && granted[2 * i + 1];
-    }
+    budget_.WillBeFiltered(std::move(tile));
   }
 
   const GatherScene& scene_;
@@ -416,11 +302,8 @@ class TileGatherer {
   const bool lit_ = !scene_.tree.empty() || scene_.lights.environment().bright() || scene_.lights.samples_distant();
   int64_t escaped_ = 0;  // gather rays
   Distant distant_ = Distant::kSampled;
-  std::optional<SmoothTile> smooth_;
-  std::vector<SmoothGrid::Smoothed> smoothed_;  // indirect light, when it was last looked at as a whole
-  float changed_ = 0;                           // texels whose indirect light went on since
+  TileBudget budget_{map_, begin_, options_};
   std::vector<Work> work_;
-  size_t valid_ = 0;  // texels
 };
 
 }  // namespace

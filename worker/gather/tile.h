@@ -33,11 +33,12 @@ struct LightPart {
 
 // One texel's result. Vectors in the world frame.
 struct TexelLight {
-  Rgb irradiance;      // at the geometric normal [W m^-2]
-  RadianceSh sh;       // incident radiance over the hemisphere around the geometric normal
-  Rgb variance;        // of irradiance, sampling and photons together
-  LightPart indirect;  // of the three above, what the final gather found
-  uint8_t open = 0;    // ConnectTexel: which neighbours the filter may look at
+  Rgb irradiance;       // at the geometric normal [W m^-2]
+  RadianceSh sh;        // incident radiance over the hemisphere around the geometric normal
+  Rgb variance;         // of irradiance, sampling and photons together
+  LightPart indirect;   // of the three above, what the final gather found
+  Rgb direct_variance;  // of the variance, what light sampling left
+  uint8_t open = 0;     // ConnectTexel: which neighbours the filter may look at
   float backface_share = 0;
   bool valid = true;  // false: inside other geometry; light is zero and no evidence for anybody
   int direct_samples = 0, indirect_samples = 0;

@@ -66,7 +66,8 @@ struct TexelWork {
     const RadianceSh direct_sh = direct.Sh(), indirect_sh = indirect.Sh();
     for (size_t i = 0; i < kShCoefficients; ++i) light.sh.lambda[i] = direct_sh.lambda[i] + indirect_sh.lambda[i];
     light.indirect = {indirect.Irradiance(), indirect_sh, IndirectVariance()};
-    light.variance = DirectVariance() + light.indirect.variance;
+    light.direct_variance = DirectVariance();
+    light.variance = light.direct_variance + light.indirect.variance;
     // Photon noise is known in luminance; it is spread over the channels as the irradiance is.
     const float luminance = Luminance(light.irradiance);
     if (luminance > 0) {

@@ -120,6 +120,7 @@ void PutTexel(const TexelLight& light, NumberWriter& writer) {
   writer.Put(light.sh);
   writer.Put(light.variance);
   writer.Put(light.indirect);
+  writer.Put(light.direct_variance);
   writer.Put(light.backface_share);
   writer.Put(static_cast<uint8_t>(light.valid));
   writer.Put(light.open);
@@ -132,6 +133,7 @@ void GetTexel(NumberReader& reader, TexelLight& light) {
   light.sh = reader.Get<RadianceSh>();
   light.variance = reader.Get<Rgb>();
   light.indirect = reader.Get<LightPart>();
+  light.direct_variance = reader.Get<Rgb>();
   light.backface_share = reader.Get<float>();
   light.valid = reader.Get<uint8_t>() != 0;
   light.open = reader.Get<uint8_t>();
@@ -139,7 +141,7 @@ void GetTexel(NumberReader& reader, TexelLight& light) {
   light.indirect_samples = static_cast<int>(reader.Get<uint32_t>());
 }
 
-constexpr size_t kTexelBytes = 4 * (2 * (3 + 27 + 3) + 1) + 2 + 8;
+constexpr size_t kTexelBytes = 4 * (2 * (3 + 27 + 3) + 3 + 1) + 2 + 8;
 constexpr size_t kCellBytes = sizeof(Rgb) + sizeof(CachedLight::group_share) + 1;
 constexpr size_t kFluxBytes = 8 + 4 + sizeof(CellFlux::flux) + sizeof(CellFlux::group);
 constexpr size_t kHeadBytes = 1024;  // what precedes the texels, cells or photons, about

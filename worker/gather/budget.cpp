@@ -1,0 +1,130 @@
+#include "worker/gather/budget.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "worker/gather/noise.h"
+
+namespace bakewell {
+namespace {
+
+constexpr float kGatherCost = 2.5f;  // of a gather ray and what it meets, over a light sample
+constexpr float kBoundless = 1e30f;  // error of what tolerates none
+constexpr float kMargin = static_cast<float>(SetNoise::kMargin);  // what is reported is safe, what stops is likely
+constexpr float kChangedShare = 0.25f;                            // of a tile's texels; fewer leave the rest as it is
+constexpr size_t kTellingSets = 32;                               // fewer sets of a tile say little about all
+
+std::vector<float> Sum(std::vector<float> a, const std::vector<float>& b) {
+  for (size_t i = 0; i < a.size(); ++i) a[i] += b[i];
+  return a;
+}
+
+}  // namespace
+
+void TileBudget::Part::Add(Rgb irradiance, Rgb its_variance, int its_samples) {
+  value.push_back(Luminance(irradiance));
+  variance.push_back(Luminance(its_variance));
+  samples.push_back(its_samples);
+}
+
+void TileBudget::Filtered::Apply(const std::vector<TexelWork>& work, Part& part) {
+  if (std::none_of(part.variance.begin(), part.variance.end(), [](float variance) { return variance > 0; })) return;
+  if (smoothed.empty() || changed > kChangedShare * static_cast<float>(work.size())) {
+    for (size_t i = 0; i < work.size(); ++i) {
+      if (work[i].valid) tile->Put(i, part.value[i], part.variance[i]);
+    }
+    smoothed = tile->Smooth();
+    changed = 0;
+  }
+  for (size_t i = 0; i < work.size(); ++i) {
+    // What the window's texels say of their variance may have missed what is rare.
+    const float filtered = std::max(smoothed[i].variance, smoothed[i].square * part.pooled[i]);
+    part.pooled[i] = std::min(part.pooled[i], filtered);
+    part.value[i] = smoothed[i].value;
+  }
+}
+
+void TileBudget::WillBeFiltered(SmoothTile tile) {
+  direct_.tile.emplace(tile, Signal::kDirect);
+  indirect_.tile.emplace(std::move(tile));
+}
+
+float TileBudget::Weighing(float irradiance) const {
+  const float mean = options_.mean_irradiance;
+  return std::sqrt(mean * std::max(irradiance, options_.floor_share * mean));
+}
+
+// How far the sets that took part in the last round are better than their blocks say.
+void TileBudget::CorrectVariances(std::vector<TexelWork>& all) const {
+  SetNoise direct, indirect;
+  for (const TexelWork& work : all) {
+    if (!work.valid) continue;
+    if (work.direct_active) direct.Add(work.direct, Weighing(Luminance(work.direct.Irradiance())));
+    if (work.indirect_active) indirect.Add(work.indirect, Weighing(Luminance(work.indirect.Irradiance())));
+  }
+  for (TexelWork& work : all) {
+    if (work.direct_active && work.direct_samples >= kBlocks && direct.sets() >= kTellingSets)
+      work.direct_correction = direct.Correction();
+    if (work.indirect_active && work.indirect_samples >= kBlocks && indirect.sets() >= kTellingSets)
+      work.indirect_correction = indirect.Correction();
+  }
+}
+
+void TileBudget::Decide(std::vector<TexelWork>& all) {
+  CorrectVariances(all);
+  Part direct, indirect;
+  std::vector<bool> valid;
+  for (const TexelWork& work : all) {
+    direct.Add(work.direct.Irradiance(), work.DirectVariance(), work.direct_samples);
+    indirect.Add(work.indirect.Irradiance(), work.IndirectVariance(), work.indirect_samples);
+    valid.push_back(work.valid);
+    direct_.changed += work.direct_active ? 1 : 0;
+    indirect_.changed += work.indirect_active ? 1 : 0;
+  }
+  const auto valid_count = static_cast<size_t>(std::count(valid.begin(), valid.end(), true));
+  const TilePool pool(map_, begin_, std::move(valid));
+  direct.pooled = pool.Variance(direct.variance, direct.samples);
+  indirect.pooled = pool.Variance(indirect.variance, indirect.samples);
+  // A stray sample must not raise its own tolerance: neighbours or the smoothed light judge.
+  std::vector<Claim> claims = Claims(all, direct, indirect, pool.Mean(Sum(direct.value, indirect.value)));
+  if (options_.filter && options_.target_error > 0 && !IsMet(claims, valid_count)) {
+    direct_.Apply(all, direct);
+    indirect_.Apply(all, indirect);
+    claims = Claims(all, direct, indirect, Sum(direct.value, indirect.value));
+  }
+  Grant(claims, valid_count, all);
+}
+
+// By pooled variances and irradiance a texel; two for each, of direct and of indirect light.
+std::vector<Claim> TileBudget::Claims(const std::vector<TexelWork>& all, const Part& direct, const Part& indirect,
+                                      const std::vector<float>& light) const {
+  std::vector<Claim> claims;
+  claims.reserve(2 * all.size());
+  for (size_t i = 0; i < all.size(); ++i) {
+    const TexelWork& work = all[i];
+    const float tolerated = Tolerated(light[i]);
+    const auto claim = [&](bool has, int samples, float cost, float variance) {
+      const float error = variance > 0 ? std::min(variance / (kMargin * tolerated * tolerated), kBoundless) : 0;
+      const int doublings = has ? std::bit_width(static_cast<unsigned>(options_.max_samples / samples)) - 1 : 0;
+      claims.push_back({has ? error : 0, cost * static_cast<float>(samples), doublings});
+    };
+    const float missed = work.Missed(light[i]);
+    claim(work.has_direct, work.direct_samples, 1, std::max(direct.pooled[i], missed * missed));
+    claim(work.has_indirect, work.indirect_samples, kGatherCost, indirect.pooled[i]);
+  }
+  return claims;
+}
+
+// Makes active who gets more samples: without a target everybody.
+void TileBudget::Grant(const std::vector<Claim>& claims, size_t valid, std::vector<TexelWork>& work) const {
+  const std::vector<bool> granted =
+      options_.target_error > 0 ? Allot(claims, valid) : std::vector<bool>(claims.size(), true);
+  for (size_t i = 0; i < work.size(); ++i) {
+    work[i].direct_active = claims[2 * i].doublings > 0 && granted[2 * i];
+    work[i].indirect_active = claims[2 * i + 1].doublings > 0 && granted[2 * i + 1];
+  }
+}
+
+}  // namespace bakewell
