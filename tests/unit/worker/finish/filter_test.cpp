@@ -68,6 +68,34 @@ TEST(FilterPage, SmoothsIndirectLightKeepsItsSumAndWeighsShTheSame) {
   EXPECT_GT(claimed, variance / 4);
 }
 
+TEST(FilterPage, SmoothsNoisyDirectLightByWindowsOfItsOwn) {
+  NoisyPage page(0);  // no indirect light
+  TestRandom random(8);
+  for (size_t i = 0; i < page.lights.size(); ++i) {
+    TexelLight& light = page.lights[i];
+    const float e = (page.map.texels[i].x < 12 ? 1.0f : 30.0f) * (1 + random.Between(-0.1f, 0.1f));
+    light.irradiance = {e, 2 * e, 3 * e};
+    light.sh.lambda[3] = light.irradiance;
+    light.direct_variance = light.variance = Rgb{1, 4, 9} * (e * e * 0.01f / 3);
+  }
+  const double before = Sum(page.lights);
+  FilterCounters counters;
+  FilterPage(page.map, 0, page.lights, counters);
+  EXPECT_GT(counters.filtered, kSide * kSide / 2);
+  EXPECT_NEAR(Sum(page.lights) / before, 1, 1e-4);
+  double square = 0;
+  for (size_t i = 0; i < page.lights.size(); ++i) {
+    const TexelLight& light = page.lights[i];
+    const float mean = page.map.texels[i].x < 12 ? 1 : 30;
+    square += static_cast<double>((light.irradiance.x / mean - 1) * (light.irradiance.x / mean - 1)) / (kSide * kSide);
+    EXPECT_NEAR(light.irradiance.x, mean, 0.15f * mean);  // the shadow's edge stays
+    EXPECT_NEAR(light.sh.lambda[3].z, light.irradiance.z, 1e-4f * light.irradiance.z);
+    EXPECT_NEAR(light.variance.y, light.direct_variance.y, 1e-4f * mean * mean);
+    EXPECT_EQ(light.indirect.irradiance.x, 0);
+  }
+  EXPECT_LT(square, 0.5 * 0.01 / 3);
+}
+
 TEST(FilterPage, InvalidTexelsAreNoEvidence) {
   NoisyPage page(1);
   for (size_t i = 0; i < page.lights.size(); ++i) {
