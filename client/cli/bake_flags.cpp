@@ -78,7 +78,7 @@ void AddSharedFlags(CLI::App& command, BakeFlags& flags) {
                      "(latitude-longitude), instead of the scene's");
   command.add_option("--albedo-limit", flags.albedo_limit, "Largest albedo; above it is clamped (0.98)");
   command.add_flag("--no-filter", flags.no_filter,
-                   "Leave the noise of indirect light as it is (at high quality it is left)");
+                   "Leave the noise as it is (at high quality it is left)");
   command.add_option("--footprint", flags.footprint, "Side of the square that a texel averages, in texels (0.5)");
   command.add_option("--seed", flags.seed, "Another seed, other noise");
   command.add_option("--threads", flags.threads, "Threads; 0: as many as the machine has")->capture_default_str();
