@@ -14,14 +14,14 @@ namespace {
 
 constexpr int kTexels = 64;
 
-enum class Light : uint8_t { kNearest, kFiltered, kGeometry };
-using IsLit = std::function<bool(int x, int y)>;  // texels, x right, y up
+enum class Light : uint8_t { kNearest, kFiltered, kCutOut, kGeometry };  // kCutOut: a lamp with holes
+using IsLit = std::function<bool(int x, int y)>;                         // texels, x right, y up
 
 // A facade of 4 x 4 m over a pavement of 4 x 4 m, with a wall to the left, all grey; some of its texels are lit.
 Scene Street(const IsLit& is_lit, Light light) {
   SceneBuilder builder({64, 32});
   const double texel = 4.0 / kTexels;
-  Texture texture{.width = kTexels, .height = kTexels, .nearest = light == Light::kNearest, .rgba = {}};
+  Texture texture{.width = kTexels, .height = kTexels, .nearest = light != Light::kFiltered, .rgba = {}};
   int lit = 0;
   for (int y = 0; y < kTexels; ++y) {
     for (int x = 0; x < kTexels; ++x) lit += is_lit(x, y) ? 1 : 0;
@@ -36,11 +36,16 @@ Scene Street(const IsLit& is_lit, Light light) {
                       {.material = lamp, .lightmapped = false});
     }
   }
-  Material facade;
+  Material facade, sign;
   facade.base_color = {0.5f, 0.5f, 0.5f};
+  sign.base_color = {0, 0, 0};
+  sign.alpha_mode = AlphaMode::kMask;
   if (light != Light::kGeometry) {
-    facade.emission = {radiance, radiance, 0.5f * radiance};
-    facade.emission_texture.texture = builder.AddTexture(texture);
+    (light == Light::kCutOut ? sign : facade).emission = {radiance, radiance, 0.5f * radiance};
+    (light == Light::kCutOut ? sign.base_texture : facade.emission_texture).texture = builder.AddTexture(texture);
+  }
+  if (light == Light::kCutOut) {
+    builder.AddQuad({0, 0, 1e-3}, {4, 0, 0}, {0, 4, 0}, {.material = builder.AddMaterial(sign), .lightmapped = false});
   }
   builder.AddQuad({0, 0, 0}, {4, 0, 0}, {0, 4, 0},
                   {.material = builder.AddMaterial(facade), .page = {0, 0, 16, 16}, .name = "facade"});
@@ -79,7 +84,7 @@ double RelativeRms(const Baked& a, const Baked& b) {
 
 void ExpectAsGeometry(const IsLit& is_lit) {
   const Baked right = PavementOf(Street(is_lit, Light::kGeometry), 100, 0.005f);
-  for (const Light light : {Light::kNearest, Light::kFiltered}) {
+  for (const Light light : {Light::kNearest, Light::kFiltered, Light::kCutOut}) {
     for (uint32_t seed = 0; seed < 3; ++seed) {
       const Baked baked = PavementOf(Street(is_lit, light), seed);
       EXPECT_NEAR(baked.mean / right.mean, 1, 0.02) << static_cast<int>(light);
