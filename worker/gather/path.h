@@ -61,7 +61,7 @@ Rgb FoundByRay(const GatherScene& scene, const SurfacePoint& from, Vec3f dir, fl
   const Rgb emission = scene.world.EmissionAt(hit);
   if (MaxComponent(emission) <= 0) return {};
   const float probability = chosen(light);
-  const float light_pdf = probability > 0 ? probability * scene.lights.PdfLocal(light, from.position, dir, hit.t) : 0;
+  const float light_pdf = probability > 0 ? probability * scene.lights.PdfLocal(light, from.position, dir, hit) : 0;
   return emission * PowerHeuristic(pdf, light_pdf);
 }
 

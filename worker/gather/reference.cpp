@@ -114,7 +114,7 @@ class PathTracer {
     const Rgb emission = world_.EmissionAt(hit);
     if (MaxComponent(emission) <= 0) return {};
     const float other = tree_.Probability(LightTree::kRoot, light, {point.position, point.normal}) *
-                        lights_.PdfLocal(light, point.position, dir, hit.t);
+                        lights_.PdfLocal(light, point.position, dir, hit);
     return emission * (pdf / (pdf + other));
   }
 

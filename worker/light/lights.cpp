@@ -12,25 +12,9 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Mean radiance of a triangle and its sides that glow: over a fixed pattern of the low-distortion map where it is not
-// the same everywhere, as fine as the textures are (a lit window of a dark facade counts), up to 256 x 256.
-Rgb MeanRadiance(const World& world, uint32_t triangle) {
-  const Material& material = world.MaterialOf(world.triangles()[triangle]);
-  if (material.emission_texture.texture < 0 && world.IsAlwaysMet(triangle)) return material.emission;
-  const float texels = world.GlowTexelsAcross(triangle);
-  const int side = texels > 8 ? static_cast<int>(std::min(texels, 256.0f)) : 8;
-  const int sides = material.double_sided ? 2 : 1;
-  const float step = 1.0f / static_cast<float>(side);
-  Rgb sum;
-  for (int y = 0; y < side; ++y) {
-    for (int x = 0; x < side; ++x) {
-      const Vec2f b =
-          TriangleFromSquare({(static_cast<float>(x) + 0.5f) * step, (static_cast<float>(y) + 0.5f) * step});
-      for (int k = 0; k < sides; ++k) sum += world.GlowAt(triangle, b.x, b.y, k == 1) * (step * step);
-    }
-  }
-  return sum / static_cast<float>(sides);
-}
+constexpr size_t kTableBytes = size_t{64} << 20;  // of all emission tables
+// Of the points on a near triangle whose emission varies, by emission; the others by solid angle.
+constexpr float kTableShare = 0.9f;
 
 }  // namespace
 
@@ -49,14 +33,31 @@ LightSet::LightSet(const World& world, const Environment& environment) : world_(
     if (light.type != LightType::kDirectional) continue;
     discs_.push_back({FrameFromHint(-light.direction, light.tangent), std::sin(0.5f * light.angular_diameter_rad)});
   }
+  std::vector<size_t> varying;  // of emissive_
   for (uint32_t k = 0; k < world.triangles().size(); ++k) {
     if (!world.Emits(k)) continue;
     const Triangle& t = world.triangles()[k];
-    const Rgb radiance = MeanRadiance(world, k);
-    if (MaxComponent(radiance) <= 0) continue;
+    const Glow glow = GlowOf(world, k);
+    if (MaxComponent(glow.mean) <= 0) continue;
     if (light_of_triangle_.empty()) light_of_triangle_.assign(world.triangles().size(), -1);
     light_of_triangle_[k] = local_count();
-    emissive_.push_back({k, 0.5f * Length(Cross(t.e1, t.e2)), radiance, world.MaterialOf(t).double_sided});
+    if (glow.varies) varying.push_back(emissive_.size());
+    emissive_.push_back({k, 0.5f * Length(Cross(t.e1, t.e2)), glow.mean, world.MaterialOf(t).double_sided});
+  }
+  MakeTables(varying);
+}
+
+void LightSet::MakeTables(std::span<const size_t> varying) {
+  std::vector<int> sides;
+  for (const size_t i : varying) sides.push_back(EmissionTable::SideFor(world_, emissive_[i].triangle));
+  const int largest = EmissionTable::LargestSide(sides, kTableBytes);
+  if (largest == 0) return;
+  tables_.reserve(varying.size());
+  for (size_t k = 0; k < varying.size(); ++k) {
+    EmissiveTriangle& light = emissive_[varying[k]];
+    light.table = static_cast<int>(k);
+    tables_.emplace_back(world_, light.triangle, std::min(sides[k], largest));
+    if (MaxComponent(tables_[k].mean()) > 0) light.mean_radiance = tables_[k].mean();
   }
 }
 
@@ -87,9 +88,18 @@ Vec2f Barycentrics(const Triangle& t, Vec3f origin, Vec3f dir) {
 
 LightSample LightSet::SampleTriangle(const EmissiveTriangle& light, Vec3f position, Vec2f u) const {
   const Triangle& t = world_.triangles()[light.triangle];
+  const EmissionTable* table = TableOf(light);
   const SphericalTriangle seen = SeenFrom(t, position);
   const bool near = seen.solid_angle() > kSolidAngleThreshold;
-  const Vec2f b = near ? Barycentrics(t, position, seen.Draw(u)) : TriangleFromSquare(u);
+  Vec2f b;
+  if (table != nullptr && (!near || u.x < kTableShare)) {
+    b = table->Draw(near ? Vec2f{std::min(u.x / kTableShare, 0x1.fffffep-1f), u.y} : u).barycentrics;
+  } else if (near) {
+    if (table != nullptr) u.x = (u.x - kTableShare) / (1 - kTableShare);
+    b = Barycentrics(t, position, seen.Draw(u));
+  } else {
+    b = TriangleFromSquare(u);
+  }
   LightSample sample;
   const Vec3f point = t.p0 + t.e1 * b.x + t.e2 * b.y;
   const Vec3f to_light = point - position;
@@ -97,12 +107,25 @@ LightSample LightSet::SampleTriangle(const EmissiveTriangle& light, Vec3f positi
   sample.dir = NormalizeOrZero(to_light);
   const float cos_light = -Dot(sample.dir, t.normal);
   if (!(distance > 0) || cos_light == 0 || (cos_light < 0 && !light.two_sided)) return sample;
-  sample.pdf = near ? 1 / seen.solid_angle() : distance * distance / (std::fabs(cos_light) * light.area);
+  sample.pdf = Pdf(light, seen.solid_angle(), b, std::fabs(cos_light), distance);
+  if (!(sample.pdf > 0)) return sample;
   const SurfacePoint end = world_.PointAt(light.triangle, b.x, b.y, cos_light < 0);
   sample.target = RayOrigin(end);
   sample.target_triangle = light.triangle;
   sample.perpendicular = world_.GlowAt(light.triangle, b.x, b.y, cos_light < 0) / sample.pdf;
   return sample;
+}
+
+float LightSet::Pdf(const EmissiveTriangle& light, float solid_angle, Vec2f barycentrics, float cos_light,
+                    float distance) const {
+  const EmissionTable* table = TableOf(light);
+  const bool near = solid_angle > kSolidAngleThreshold;
+  if (near && table == nullptr) return 1 / solid_angle;
+  if (!(cos_light > 0)) return 0;
+  const float even = distance * distance / (cos_light * light.area);
+  if (table == nullptr) return even;
+  const float by_emission = table->Pdf(barycentrics) * even;
+  return near ? kTableShare * by_emission + (1 - kTableShare) / solid_angle : by_emission;
 }
 
 LightSample LightSet::SampleLocal(int light, Vec3f position, Vec2f u) const {
@@ -118,13 +141,11 @@ LightSample LightSet::SampleLocal(int light, Vec3f position, Vec2f u) const {
   return sample;
 }
 
-float LightSet::PdfLocal(int light, Vec3f position, Vec3f dir, float t) const {
+float LightSet::PdfLocal(int light, Vec3f position, Vec3f dir, const Hit& hit) const {
   const EmissiveTriangle& emissive = emissive_[static_cast<size_t>(light) - locals_.size()];
   const Triangle& triangle = world_.triangles()[emissive.triangle];
-  const float solid_angle = SeenFrom(triangle, position).solid_angle();
-  if (solid_angle > kSolidAngleThreshold) return 1 / solid_angle;
-  const float cos_light = std::fabs(Dot(dir, triangle.normal));
-  return cos_light > 0 ? t * t / (cos_light * emissive.area) : 0;
+  return Pdf(emissive, SeenFrom(triangle, position).solid_angle(), {hit.u, hit.v}, std::fabs(Dot(dir, triangle.normal)),
+             hit.t);
 }
 
 LightSample LightSet::SampleDirectional(int directional, Vec2f u) const {

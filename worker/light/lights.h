@@ -1,7 +1,9 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
+#include "worker/light/emission_table.h"
 #include "worker/light/environment.h"
 #include "worker/trace/world.h"
 
@@ -13,6 +15,7 @@ struct EmissiveTriangle {
   float area = 0;  // [m^2]
   Rgb mean_radiance;
   bool two_sided = false;
+  int table = -1;  // LightSet::TableOf; -1: it glows evenly, about
 };
 
 // Light that arrives at a point from one sampled point of one light, before visibility.
@@ -44,11 +47,17 @@ class LightSet {
   // The local light of an emissive triangle, or -1: of those that coincide, the ones that rays meet are lights.
   int LightOfTriangle(uint32_t triangle) const;
 
+  // Null where a triangle glows evenly, about, or has no table because very many others want one.
+  const EmissionTable* TableOf(const EmissiveTriangle& light) const {
+    return light.table < 0 ? nullptr : &tables_[static_cast<size_t>(light.table)];
+  }
+
   // A point of local light `light` as seen from `position`. pdf: uniform in solid angle for near triangles, in area for
-  // far ones, as PdfLocal says.
+  // far ones; those with a table by that, near ones in part. As PdfLocal says.
   LightSample SampleLocal(int light, Vec3f position, Vec2f u) const;
-  // Density per steradian with which SampleLocal draws the point of `triangle` at distance t along unit `dir`.
-  float PdfLocal(int light, Vec3f position, Vec3f dir, float t) const;
+  // Density per steradian with which SampleLocal draws the point where a ray from `position` along unit `dir` meets
+  // the light's triangle: the hit's distance and barycentrics.
+  float PdfLocal(int light, Vec3f position, Vec3f dir, const Hit& hit) const;
   LightSample SampleDirectional(int directional, Vec2f u) const;
   LightSample SampleEnvironment(Vec2f u) const;
 
@@ -64,13 +73,18 @@ class LightSet {
     Frame across;  // n: towards the light
     float sin_radius = 0;
   };
+  // For those whose emission varies, elements of emissive_.
+  void MakeTables(std::span<const size_t> varying);
   LightSample SampleTriangle(const EmissiveTriangle& light, Vec3f position, Vec2f u) const;
+  float Pdf(const EmissiveTriangle& light, float solid_angle, Vec2f barycentrics, float cos_light,
+            float distance) const;
   float ImportanceOfTriangle(const EmissiveTriangle& light, Vec3f position, Vec3f normal, float radius) const;
 
   const World& world_;
   std::vector<PunctualLight> locals_, directionals_;
   std::vector<Disc> discs_;  // of the directional lights
   std::vector<EmissiveTriangle> emissive_;
+  std::vector<EmissionTable> tables_;
   std::vector<int> light_of_triangle_;  // one per triangle, empty where nothing emits
   EnvironmentLight environment_;
 };

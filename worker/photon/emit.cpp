@@ -40,17 +40,19 @@ Photon FromPunctual(const PunctualLight& light, Vec2f u, double photons) {
           light.intensity * static_cast<float>(2 * kPi * static_cast<double>(flat + rim) / photons), 0};
 }
 
-Photon FromTriangle(const World& world, const EmissiveTriangle& light, Vec2f u_position, Vec2f u_direction,
+Photon FromTriangle(const LightSet& lights, const EmissiveTriangle& light, Vec2f u_position, Vec2f u_direction,
                     float u_side, double photons) {
+  const World& world = lights.world();
   const Triangle& t = world.triangles()[light.triangle];
-  const Vec2f b = TriangleFromSquare(u_position);
+  const EmissionTable* table = lights.TableOf(light);
+  const auto [b, pdf] = table ? table->Draw(u_position) : EmissionTable::Sample{TriangleFromSquare(u_position)};
   const bool back = light.two_sided && u_side < 0.5f;
   const SurfacePoint point = world.PointAt(light.triangle, b.x, b.y, back);
   const Frame frame = FrameFromHint(point.normal, t.e1);
   const double sides = light.two_sided ? 2 : 1;
   return {RayOrigin(point), frame.ToWorld(CosineHemisphere(u_direction)),
           world.GlowAt(light.triangle, b.x, b.y, back) *
-              static_cast<float>(kPi * static_cast<double>(light.area) * sides / photons),
+              (static_cast<float>(kPi * static_cast<double>(light.area) * sides / photons) / pdf),
           0, light.triangle};
 }
 
@@ -93,7 +95,7 @@ class Emitter {
     }
     if (!lights_.IsEmissive(source.light)) return FromPunctual(lights_.locals()[source.light], u.Get2(0), n);
     const EmissiveTriangle& triangle = lights_.emissive()[static_cast<size_t>(source.light) - lights_.locals().size()];
-    return FromTriangle(world_, triangle, u.Get2(2), u.Get2(0), u.Get(7), n);
+    return FromTriangle(lights_, triangle, u.Get2(2), u.Get2(0), u.Get(7), n);
   }
 
   const World& world_;
@@ -232,7 +234,9 @@ float MaxWeight(const LightSet& lights, const PhotonSource& source) {
   } else {
     const EmissiveTriangle& e = lights.emissive()[static_cast<size_t>(source.light) - lights.locals().size()];
     const Material& material = lights.world().MaterialOf(lights.world().triangles()[e.triangle]);
-    flux = static_cast<double>(MaxComponent(material.emission)) * static_cast<double>(e.area) * 2 * kPi;
+    const EmissionTable* table = lights.TableOf(e);
+    const double area = 2 * static_cast<double>(e.area);
+    flux = static_cast<double>(table ? table->most_over_pdf() : MaxComponent(material.emission)) * area * kPi;
   }
   return static_cast<float>(flux / n * 1.001);
 }

@@ -79,4 +79,7 @@ inline Vec2f TriangleFromSquare(Vec2f u) {
   return {a, b};
 }
 
+// The point of the square that TriangleFromSquare takes to barycentrics `b`.
+inline Vec2f SquareFromTriangle(Vec2f b) { return b.y > b.x ? Vec2f{2 * b.x, b.x + b.y} : Vec2f{b.x + b.y, 2 * b.y}; }
+
 }  // namespace bakewell

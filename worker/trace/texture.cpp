@@ -73,29 +73,53 @@ Rgb SampleColor(const Texture& texture, const TextureRef& ref, Vec2f uv) {
   return sum;
 }
 
-std::pair<float, float> AlphaRange(const Texture& texture, const TextureRef& ref, const std::array<Vec2f, 3>& corners) {
-  constexpr float kMargin = 2;  // texels: the filter's reach and rounding
-  constexpr double kMostTexels = 65536;
+namespace {
+
+// Calls visit(texel) for all within `margin` texels of the bounding box of some texture coordinates. False, without a
+// call, where those are more than `most`, or too far away.
+template <typename Visit>
+bool VisitAround(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners, float margin,
+                 double most, Visit visit) {
   constexpr float kFarthest = 1 << 20;  // texels; beyond, their numbers are not exact
   const Vec2f size{static_cast<float>(texture.width), static_cast<float>(texture.height)};
-  if (texture.width <= 0 || texture.height <= 0) return {0, 0};
   Vec2f low{kFarthest, kFarthest}, high = low * -1.0f;
   for (const Vec2f corner : corners) {
     const Vec2f p = Transform(ref, corner);
-    if (!std::isfinite(p.x) || !std::isfinite(p.y)) return {0, 1};
-    low = {std::min(low.x, p.x * size.x - kMargin), std::min(low.y, p.y * size.y - kMargin)};
-    high = {std::max(high.x, p.x * size.x + kMargin), std::max(high.y, p.y * size.y + kMargin)};
+    if (!std::isfinite(p.x) || !std::isfinite(p.y)) return false;
+    low = {std::min(low.x, p.x * size.x - margin), std::min(low.y, p.y * size.y - margin)};
+    high = {std::max(high.x, p.x * size.x + margin), std::max(high.y, p.y * size.y + margin)};
   }
-  if (low.x < -kFarthest || low.y < -kFarthest || high.x > kFarthest || high.y > kFarthest) return {0, 1};
-  if (static_cast<double>(high.x - low.x) * static_cast<double>(high.y - low.y) > kMostTexels) return {0, 1};
+  if (low.x < -kFarthest || low.y < -kFarthest || high.x > kFarthest || high.y > kFarthest) return false;
+  if (static_cast<double>(high.x - low.x) * static_cast<double>(high.y - low.y) > most) return false;
+  const int x_end = static_cast<int>(std::floor(high.x)) + 1, y_end = static_cast<int>(std::floor(high.y)) + 1;
+  for (int y = static_cast<int>(std::floor(low.y)); y < y_end; ++y) {
+    for (int x = static_cast<int>(std::floor(low.x)); x < x_end; ++x) visit(TexelAt(texture, x, y));
+  }
+  return true;
+}
+
+}  // namespace
+
+TexelBound MostOver(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners) {
+  if (texture.width <= 0 || texture.height <= 0) return {{0, 0, 0}, 0};
+  constexpr float kRounding = 0.05f;  // texels: 2^-24 of a coordinate of 2^20, nearly
+  std::array<uint8_t, 4> most{};
+  const auto visit = [&](const uint8_t* texel) {
+    for (size_t c = 0; c < 4; ++c) most[c] = std::max(most[c], texel[c]);
+  };
+  if (!VisitAround(texture, ref, corners, kRounding + (texture.nearest ? 0.0f : 0.5f), 256, visit)) return {};
+  return {{kSrgb[most[0]], kSrgb[most[1]], kSrgb[most[2]]}, static_cast<float>(most[3]) / 255.0f};
+}
+
+std::pair<float, float> AlphaRange(const Texture& texture, const TextureRef& ref, const std::array<Vec2f, 3>& corners) {
+  constexpr float kMargin = 2;  // texels: the filter's reach and rounding
+  if (texture.width <= 0 || texture.height <= 0) return {0, 0};
   uint8_t least = 255, most = 0;
-  for (int y = static_cast<int>(std::floor(low.y)); y <= static_cast<int>(high.y); ++y) {
-    for (int x = static_cast<int>(std::floor(low.x)); x <= static_cast<int>(high.x); ++x) {
-      const uint8_t alpha = TexelAt(texture, x, y)[3];
-      least = std::min(least, alpha);
-      most = std::max(most, alpha);
-    }
-  }
+  const auto visit = [&](const uint8_t* texel) {
+    least = std::min(least, texel[3]);
+    most = std::max(most, texel[3]);
+  };
+  if (!VisitAround(texture, ref, corners, kMargin, 65536, visit)) return {0, 1};
   return {static_cast<float>(least) / 255.0f, static_cast<float>(most) / 255.0f};
 }
 

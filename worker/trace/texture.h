@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <utility>
 
 #include "core/scene/scene.h"
@@ -13,6 +14,15 @@ Rgb SampleColor(const Texture& texture, const TextureRef& ref, Vec2f uv);
 
 // Alpha in [0,1], likewise.
 float SampleAlpha(const Texture& texture, const TextureRef& ref, Vec2f uv);
+
+// Bounds of SampleColor and SampleAlpha from above.
+struct TexelBound {
+  Rgb color{1, 1, 1};
+  float alpha = 1;
+};
+// Over the hull of some texture coordinates, from the texels that the filter reaches from its bounding box; 1 where
+// that holds more than 256 of them.
+TexelBound MostOver(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners);
 
 // Bounds of SampleAlpha over the triangle with these texture coordinates, from the texels of its bounding box: {least,
 // most}. {0, 1} where that holds more than 65,536 of them.

@@ -369,4 +369,20 @@ Rgb World::GlowAt(uint32_t triangle, float u, float v, bool back) const {
   return share > 0 ? FrontEmissionAt(triangle, u, v) * share : Rgb{};
 }
 
+Rgb World::MostGlow(uint32_t triangle, const std::array<Vec2f, 4>& points) const {
+  const Triangle& t = triangles_[triangle];
+  const Material& material = MaterialOf(t);
+  const auto most = [&](const TextureRef& ref) {
+    if (ref.texture < 0) return TexelBound{};
+    std::array<Vec2f, 4> corners;
+    for (size_t i = 0; i < corners.size(); ++i) corners[i] = TexcoordAt(t, ref.texcoord, points[i].x, points[i].y);
+    return MostOver(scene_.textures[ref.texture], ref, corners);
+  };
+  const Rgb emission = material.emission * most(material.emission_texture).color;
+  if (material.alpha_mode == AlphaMode::kOpaque || MaxComponent(emission) <= 0) return emission;
+  const float alpha = material.base_alpha * most(material.base_texture).alpha;
+  if (material.alpha_mode == AlphaMode::kMask) return alpha < material.alpha_cutoff - kAlphaRounding ? Rgb{} : emission;
+  return emission * std::clamp(alpha, 0.0f, 1.0f);
+}
+
 }  // namespace bakewell

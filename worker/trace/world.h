@@ -69,6 +69,8 @@ class World {
   bool IsAlwaysMet(uint32_t triangle) const { return triangle < opaque_count_; }  // ShareMet is 1 everywhere
   // Mean radiance that those rays find: EmissionAt by ShareMet.
   Rgb GlowAt(uint32_t triangle, float u, float v, bool back) const;
+  // Bound of GlowAt, of either side and each channel, over the hull of points of a triangle (barycentrics).
+  Rgb MostGlow(uint32_t triangle, const std::array<Vec2f, 4>& points) const;
   bool Emits(uint32_t triangle) const;
   // How many texels of the textures that say how it glows, emission and alpha, lie along a triangle's longer edge of e1
   // and e2, about; 0 without textures.

@@ -6,21 +6,10 @@
 
 #include "tests/support/scene_builder.h"
 #include "tests/support/statistics.h"
+#include "tests/unit/worker/light/lit.h"
 
 namespace bakewell {
 namespace {
-
-// A world and its lights; the scene must stay where it is.
-struct Lit {
-  explicit Lit(Scene from) : scene(std::move(from)) {
-    world = World::Build(scene, BackfaceMode::kReflect, 0.98f).value();
-    lights = std::make_unique<LightSet>(*world, scene.environment);
-  }
-  Lit(const Lit&) = delete;
-  Scene scene;
-  std::unique_ptr<World> world;
-  std::unique_ptr<LightSet> lights;
-};
 
 Scene Lights(int count, uint32_t seed) {
   TestRandom random(seed);

@@ -100,6 +100,19 @@ TEST(Warp, TriangleIsUniform) {
   EXPECT_LT(ChiSquareOf(observed, expected).Z(), 4);
 }
 
+TEST(Warp, SquareFromTriangleUndoesTriangleFromSquare) {
+  TestRandom random(4);
+  for (int i = 0; i < 10000; ++i) {
+    Vec2f u = random.Square();
+    if (i % 8 == 0) u.y = u.x;  // where the map is bent
+    if (i % 8 == 1) u.x = 0;
+    if (i % 8 == 2) u.y = 0;
+    const Vec2f back = SquareFromTriangle(TriangleFromSquare(u));
+    EXPECT_NEAR(back.x, u.x, 1e-7);
+    EXPECT_NEAR(back.y, u.y, 1e-7);
+  }
+}
+
 TEST(Circle, IsCosineAndSine) {
   for (int i = 0; i <= 4096; ++i) {
     const float turns = static_cast<float>(i) / 4096;
