@@ -20,6 +20,7 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kCulledShare = 0.1f;      // of the target error of the tile's dimmest texel
+constexpr int kDividedSamples = 32;       // at first, of a texel that lies partly inside other geometry
 constexpr uint32_t kGuidedFrom = 16;      // samples; for fewer a guide costs more than it gains
 constexpr int64_t kWorthLeavingOut = 64;  // texels; fewer cost less than the audit
 
@@ -91,9 +92,12 @@ class TileGatherer {
     }
   }
 
-  // What other geometry may divide is looked at closely from the start.
+  // What other geometry may divide is looked at closely from the start, and what it does divide has neither all of its
+  // samples nor neighbours that could tell what it missed.
   uint32_t FirstSamples(const Work& work) const {
-    return static_cast<uint32_t>(work.crowded ? std::max(options_.min_samples, kBlocks) : options_.min_samples);
+    const bool divided = work.sampler.valid_mask() != 0xffff;
+    const int least = divided ? kDividedSamples : work.crowded ? kBlocks : options_.min_samples;
+    return static_cast<uint32_t>(std::clamp(least, options_.min_samples, options_.max_samples));
   }
 
   std::vector<uint32_t> Keys() const {
@@ -117,7 +121,7 @@ class TileGatherer {
     for (size_t i = 0; i < work_.size(); ++i) {
       Work& work = work_[i];
       rays[i] -= counters_.light_rays();
-      if (work.has_direct) DirectRound(work, 0, static_cast<uint32_t>(options_.min_samples));
+      if (work.has_direct) DirectRound(work, 0, FirstSamples(work));
       rays[i] += counters_.light_rays();
       const float found = Luminance(work.direct.Irradiance()) + Luminance(work.indirect.Irradiance());
       if (work.audited && work.valid) audit.Found(found, options_.mean_irradiance, rays[i]);
