@@ -104,5 +104,40 @@ TEST(Convergence, ErrorFallsAtLeastWithTheRootOfTheSamples) {
   for (size_t i = 1; i < log_filtered.size(); ++i) EXPECT_LT(log_filtered[i], log_filtered[i - 1] - 0.15) << i;
 }
 
+// A floor below a plate with a hole over a third of every other texel's footprint, each way; the sun reaches half of
+// what is left open.
+Scene FloorUnderHoles() {
+  constexpr int kSide = 24;
+  SceneBuilder builder({kSide, kSide});
+  builder.AddQuad({0, 0, 0}, {0, 0, kSide}, {kSide, 0, 0}, {.material = 0, .page = {0, 0, kSide, kSide}});
+  const auto plate = [&](double x0, double x1, double z0, double z1) {
+    builder.AddBox({x0, -0.5, z0}, {x1, 0.3, z1}, {.material = 0, .lightmapped = false});
+  };
+  for (int i = 0; i <= kSide; i += 2) {
+    const double hole = i + 0.1, before = i == 0 ? -1 : hole - 1.55;  // holes are 0.45 wide, 0.3 of it in the footprint
+    plate(-1, kSide + 1, before, hole);
+    for (int k = 0; i < kSide && k <= kSide; k += 2) plate(k == 0 ? -1 : k - 1.45, k + 0.1, hole, hole + 0.45);
+  }
+  builder.AddDirectionalLight({0.75, -1, 0}, {3, 3, 3});
+  return builder.Build();
+}
+
+// Symptom: where other geometry leaves a third of a texel and all texels around it lie inside, the four samples of the
+// first round were one or two, found no sun, had no spread, and that was that: one texel of a cluttered room made a
+// quarter of its error at 2 %.
+TEST(Convergence, TexelsPartlyInsideOtherGeometryDoNotMissTheSun) {
+  const Scene scene = FloorUnderHoles();
+  const BakedScene few = BakeSceneInMemory(scene, {});
+  const std::vector<double> many = LuminancesWith(scene, 1024, false);
+  int divided = 0;
+  for (size_t i = 0; i < many.size(); ++i) {
+    if (!few.lights()[i].valid || !(many[i] > 0.3)) continue;
+    ++divided;
+    const auto light = static_cast<double>(Luminance(few.lights()[i].irradiance));
+    EXPECT_NEAR(light / many[i], 1, 0.5) << few.texels()[i].x << " " << few.texels()[i].y;
+  }
+  EXPECT_GT(divided, 100);
+}
+
 }  // namespace
 }  // namespace bakewell
