@@ -380,7 +380,7 @@ float SmoothGrid::Agree(int x, int y) const {
   if (median <= cell.radius) return median;
   const float follows = std::clamp((kStraysMost - cell.stray) / (kStraysMost - kStraysByNoise), 0.0f, 1.0f);
   const float radius = cell.radius + follows * (median - cell.radius);
-  return signal_ == Signal::kIndirect ? radius : std::max(cell.radius, Reach(x, y, kFollowed, radius, nullptr));
+  return std::max(cell.radius, Reach(x, y, kFollowed, radius, nullptr));
 }
 
 SmoothGrid::Window SmoothGrid::WindowOf(int x, int y, float radius) const {

@@ -25,7 +25,7 @@ struct SmoothCell {
 };
 
 // What a grid's texels hold. Direct light has edges that its noise does not hide: the confidence intervals of its
-// windows are narrower, and a texel follows its neighbours' windows only as far as its own admit it.
+// windows are narrower.
 enum class Signal : uint8_t { kIndirect, kDirect };
 
 // A rectangle of texels with a noisy signal, and how far around each texel it may be averaged.
@@ -88,7 +88,7 @@ class SmoothGrid {
 
   // The median of the radii of a texel and its neighbours (SmoothCell::radius): a texel that strays by more than its
   // interval, as some must, would otherwise keep to itself. One that strays farther than noise does (SmoothCell::stray)
-  // keeps to itself: it is a detail. Of direct light no farther than wide intervals of its own go.
+  // keeps to itself: it is a detail. None goes farther than where wide intervals of its own part.
   float Agree(int x, int y) const;
 
   // What a window of `radius` gives; fills in the steps that it needs.

@@ -11,8 +11,9 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int kMaxExtraBounces = 4;
-// A first hit nearer than this many neighbourhood widths continues the path.
-constexpr float kNearWidths = 1.5f;
+// A first hit nearer than this many neighbourhood widths continues the path; a later one nearer than this many sides of
+// a cell, as between the walls of a gap that cells cannot tell from what is outside it.
+constexpr float kNearWidths = 1.5f, kGapSides = 0.5f;
 
 float Random(uint32_t key, uint32_t what) { return UnitFloat(HashCombine(key, what)); }
 
@@ -74,7 +75,8 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
     const CachedLight& cached = CacheAt(scene, point, hit.back);
     const uint32_t step_key = HashCombine(key, static_cast<uint32_t>(bounce));
     const float side = scene.cells.patches()[scene.cells.PatchOf(hit.triangle)].cell_side_m;
-    const bool near = bounce == 0 && hit.t < kNearWidths * side * static_cast<float>(cached.window);
+    const float reach = bounce == 0 ? kNearWidths * static_cast<float>(cached.window) : kGapSides;
+    const bool near = hit.t < reach * side;
     const bool read = (cached.window != 0 && !near) || bounce == kMaxExtraBounces;
     if (read) {
       const Rgb reflected = throughput * cached.irradiance;
