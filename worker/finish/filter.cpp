@@ -7,9 +7,11 @@
 #include <bit>
 #include <cstddef>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "worker/filter/window.h"
+#include "worker/gather/noise.h"
 
 namespace bakewell {
 namespace {
@@ -27,7 +29,8 @@ class PageFilter {
     }
   }
 
-  void Run(std::vector<bool>& filtered) {
+  // Returns what is to be added to FilterCounters::bias_square.
+  double Run(std::vector<bool>& filtered) {
     for (const uint32_t i : texels_) Put(i);
     grid_.MeasureRoom();
     std::vector<SmoothGrid::Calm> calm(texels_.size());
@@ -39,13 +42,15 @@ class PageFilter {
     });
     std::vector<LightPart> smooth(texels_.size());
     std::vector<uint8_t> changed(texels_.size(), 0);
-    ForEach([&](size_t k, const Texel& texel) { changed[k] = Smooth(texel, smooth[k]) ? 1 : 0; });
+    std::vector<double> bias_square(texels_.size(), 0);
+    ForEach([&](size_t k, const Texel& texel) { changed[k] = Smooth(texel, smooth[k], bias_square[k]) ? 1 : 0; });
     KeepFlux(changed, smooth);
     for (size_t k = 0; k < texels_.size(); ++k) {
       if (changed[k] == 0) continue;
       Replace(lights_[texels_[k]], smooth[k]);
       filtered[texels_[k]] = true;
     }
+    return std::accumulate(bias_square.begin(), bias_square.end(), 0.0);
   }
 
  private:
@@ -96,7 +101,7 @@ class PageFilter {
     for (size_t k = 0; k < kWide; ++k) sum[k] += numbers[k] * weight;
   }
 
-  bool Smooth(const Texel& texel, LightPart& result) const {
+  bool Smooth(const Texel& texel, LightPart& result, double& bias_square) const {
     if (!grid_.At(texel.x, texel.y).known) return false;
     const SmoothGrid::Window window = grid_.WindowOf(texel.x, texel.y, grid_.Agree(texel.x, texel.y));
     const int radius = window.radius;
@@ -115,7 +120,14 @@ class PageFilter {
     }
     result = std::bit_cast<LightPart>(sum);
     result.variance = variance;
-    return std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) >= 0;
+    if (std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) < 0) return false;
+    // Without bias the texel would move by as much as its noise and the window's, which share its own weight.
+    const TexelLight& own = *LightAt(texel.x, texel.y);
+    const float moved = Luminance(result.irradiance) - ValueOf(own);
+    const float noise = Luminance(VarianceOf(own)) * (1 - 2 * window.At(0, 0)) + Luminance(variance);
+    bias_square =
+        static_cast<double>(moved) * static_cast<double>(moved) - static_cast<double>(noise) / SetNoise::kMargin;
+    return true;
   }
 
   // Windows that avoid a bright stray lose its light: each chart's sum is brought back to what it was.
@@ -170,8 +182,8 @@ void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, Fil
   std::vector<bool> filtered(lights.size(), false);
   const bool noisy = std::any_of(lights.begin(), lights.end(),
                                  [](const TexelLight& light) { return MaxComponent(light.direct_variance) > 0; });
-  if (noisy) PageFilter(map, page, Signal::kDirect, lights).Run(filtered);
-  PageFilter(map, page, Signal::kIndirect, lights).Run(filtered);
+  if (noisy) counters.bias_square += PageFilter(map, page, Signal::kDirect, lights).Run(filtered);
+  counters.bias_square += PageFilter(map, page, Signal::kIndirect, lights).Run(filtered);
   counters.filtered += std::count(filtered.begin(), filtered.end(), true);
 }
 

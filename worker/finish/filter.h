@@ -8,6 +8,10 @@ namespace bakewell {
 
 struct FilterCounters {
   int64_t filtered = 0;  // texels whose window is more than themselves
+  // Sum over texels of the squared bias that windows add [W^2 m^-4, luminance]: by how much more texels move than their
+  // noise explains. It errs on the low side, since windows end where they part from a texel's own noise, and may be
+  // negative.
+  double bias_square = 0;
 };
 
 // Smooths the direct and the indirect light of one page's texels, each by windows of its own (worker/filter/window.h),

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -37,13 +38,14 @@ void BakeTally::Add(const BakeTally& page) {
   counters_.skip.Add(other.counters_.skip);
   variance_ += other.variance_;
   irradiance_ += other.irradiance_;
+  bias_square_ += other.bias_square_;
 }
 
 std::string BakeTally::Serialize() const {
   BakeTally copy = *this;
   FieldWriter writer;
   for (const int64_t* value : copy.Integers()) writer.Put(static_cast<uint64_t>(*value));
-  for (const double value : {variance_, irradiance_}) writer.Put(std::bit_cast<uint64_t>(value));
+  for (const double value : {variance_, irradiance_, bias_square_}) writer.Put(std::bit_cast<uint64_t>(value));
   writer.PutString(bakewell::Serialize(counters_.skip));
   return std::move(writer).bytes();
 }
@@ -52,7 +54,8 @@ absl::StatusOr<BakeTally> BakeTally::Parse(std::string_view bytes) {
   FieldReader reader(bytes);
   BakeTally tally;
   for (int64_t* value : tally.Integers()) *value = static_cast<int64_t>(reader.Get<uint64_t>());
-  for (double* value : {&tally.variance_, &tally.irradiance_}) *value = std::bit_cast<double>(reader.Get<uint64_t>());
+  for (double* value : {&tally.variance_, &tally.irradiance_, &tally.bias_square_})
+    *value = std::bit_cast<double>(reader.Get<uint64_t>());
   const std::string skip = reader.GetString();
   BAKEWELL_RETURN_IF_ERROR(reader.Finish("tally"));
   BAKEWELL_ASSIGN_OR_RETURN(tally.counters_.skip, ParseSkipTally(skip));
@@ -63,6 +66,7 @@ void BakeTally::Count(const GatherCounters& counters) { counters_.Add(counters);
 
 void BakeTally::Count(std::span<const TexelLight> lights, const FilterCounters& filter) {
   filtered_ += filter.filtered;
+  bias_square_ += filter.bias_square;
   texels_ += std::ssize(lights);
   for (const TexelLight& light : lights) {
     direct_samples_ += light.direct_samples;
@@ -74,9 +78,9 @@ void BakeTally::Count(std::span<const TexelLight> lights, const FilterCounters& 
   }
 }
 
-double BakeTally::EstimatedError() const {
+double BakeTally::OverMean(double squares) const {
   const double count = static_cast<double>(valid_);
-  return irradiance_ > 0 ? std::sqrt(variance_ / count) / (irradiance_ / count) : 0;
+  return irradiance_ > 0 ? std::sqrt(squares / count) / (irradiance_ / count) : 0;
 }
 
 namespace {
@@ -114,6 +118,7 @@ absl::StatusOr<BakeReport> BakeTally::Finish(const level_task::PhotonCounts& pho
                      {"density/rays", photons.density_rays},
                      {"filter/rays", counters_.filter_rays},
                      {"filter/texels", filtered_},
+                     {"filter/bias_ppm", std::llround(1e6 * OverMean(std::max(0.0, bias_square_)))},
                      {"gather/direct_samples", direct_samples_},
                      {"gather/indirect_samples", indirect_samples_},
                      {"gather/rays", counters_.gather_rays},

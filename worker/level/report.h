@@ -29,12 +29,15 @@ class BakeTally {
                                     const SkipSet& no_skip) const;
 
  private:
-  double EstimatedError() const;
+  double EstimatedError() const { return OverMean(variance_); }
+  // Root of the mean over valid texels of what sums up to `squares`, over their mean irradiance.
+  double OverMean(double squares) const;
   std::array<int64_t*, 11> Integers();
 
   GatherCounters counters_;
   int64_t texels_ = 0, valid_ = 0, filtered_ = 0, direct_samples_ = 0, indirect_samples_ = 0;
   double variance_ = 0, irradiance_ = 0;  // sums of luminance over valid texels
+  double bias_square_ = 0;                // FilterCounters
 };
 
 }  // namespace bakewell
