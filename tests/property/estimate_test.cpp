@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/support/bake_scene.h"
 #include "tests/support/scene_builder.h"
+#include "tests/support/statistics.h"
 
 namespace bakewell {
 namespace {
@@ -45,6 +47,38 @@ TEST(RadianceCache, FewPhotonsPerCellAreNotBiased) {
   for (const int photons_per_cell : {2, 5, 20, 40}) {
     EXPECT_NEAR(CacheMean(photons_per_cell, 0), 1, 3e-3) << photons_per_cell;
   }
+}
+
+// Symptom: a photon that falls on a chip of a few square millimetres is hundreds of means there, and a gather ray that
+// meets the chip brought it home: one texel of a sunlit level was a million times too bright.
+TEST(RadianceCache, ChipsSmallerThanACellAreNotRead) {
+  TestRandom random(3);
+  SceneBuilder builder;
+  const int lamp = builder.AddMaterial(Rgb{0, 0, 0}, Rgb{8, 8, 8});
+  builder.AddRoom({0, 0, 0}, {4, 3, 4}, {.material = 0, .page = {0, 0, 48, 32}});
+  builder.AddQuad({1.5, 2.9, 1.5}, {1, 0, 0}, {0, 0, 1}, {.material = lamp, .lightmapped = false});
+  for (int i = 0; i < 1500; ++i) {
+    const auto place = [&] { return static_cast<double>(random.Between(0.3f, 2.7f)); };
+    const Vec3d a{place(), place(), place()};
+    builder.AddTriangle(a, a + Vec3d{0.002, 0, 0}, a + Vec3d{0, 0, -0.002}, {.lightmapped = false});
+  }
+  const PreparedLevel prepared = PrepareInMemory(builder.Build(), {});
+  const SurfaceCells cells = SurfaceCells::Build(*prepared.world, 4096);
+  const EmissionGuide guide =
+      EmissionGuide::Learn(*prepared.world, *prepared.lights, prepared.layout, prepared.texels, 100, 0);
+  const PhotonPlan plan = PlanPhotons(*prepared.lights, guide, 400000, 0);
+  PhotonMap map;
+  map.flux.resize(2 * cells.cells().size());
+  SilentProgress progress;
+  EmitPhotons(*prepared.world, *prepared.lights, guide, cells, plan, 0, plan.photons, progress, map);
+  const RadianceCache cache = EstimateDensity(*prepared.world, cells, map, plan, {}, progress);
+  float most = 0, brightest = 0;
+  for (const CachedLight& light : cache.light) {
+    (light.window == 0 ? brightest : most) =
+        std::max(light.window == 0 ? brightest : most, Luminance(light.irradiance));
+  }
+  EXPECT_GT(brightest, 50.0f);  // some photon met a chip
+  EXPECT_LT(most, 20.0f);        // the lamp's own irradiance at its edge is 8 pi / 2
 }
 
 // A small room of one lamp and a block, 8 x 12 texels of which matter.

@@ -10,7 +10,7 @@ namespace bakewell {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr int kMaxExtraBounces = 4;
+constexpr int kMostNear = 4, kMostBounces = 64;  // bounces: of hits that are near, and of all
 // A first hit nearer than this many neighbourhood widths continues the path; a later one nearer than this many sides of
 // a cell, as between the walls of a gap that cells cannot tell from what is outside it.
 constexpr float kNearWidths = 1.5f, kGapSides = 0.5f;
@@ -69,7 +69,8 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
   Rgb throughput{1, 1, 1};
   Hit hit = first;
   for (int bounce = 0;; ++bounce) {
-    throughput = throughput * scene.world.AlbedoAt(hit) * kInvPiF;
+    const Rgb albedo = scene.world.AlbedoAt(hit);
+    throughput = throughput * albedo * kInvPiF;
     if (MaxComponent(throughput) <= 0) return result;
     const SurfacePoint point = scene.world.PointAt(hit);
     const CachedLight& cached = CacheAt(scene, point, hit.back);
@@ -77,13 +78,17 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
     const float side = scene.cells.patches()[scene.cells.PatchOf(hit.triangle)].cell_side_m;
     const float reach = bounce == 0 ? kNearWidths * static_cast<float>(cached.window) : kGapSides;
     const bool near = hit.t < reach * side;
-    const bool read = (cached.window != 0 && !near) || bounce == kMaxExtraBounces;
-    if (read) {
+    if (cached.window != 0 && (!near || bounce >= kMostNear)) {
       const Rgb reflected = throughput * cached.irradiance;
       result.radiance += reflected;
       const float unit = Luminance(reflected) / CachedLight::kShareUnit;
       for (size_t g = 0; g < kVarianceGroups; ++g) result.group[g] = unit * static_cast<float>(cached.group_share[g]);
       return result;
+    }
+    if (bounce >= kMostNear) {
+      const float survive = MaxComponent(albedo);
+      if (bounce == kMostBounces || Random(step_key, 10) >= survive) return result;
+      throughput = throughput / survive;
     }
     result.radiance += throughput * SampleDirect(scene, point, step_key, counters);
     const Frame frame = FrameFromHint(point.normal, scene.world.triangles()[hit.triangle].e1);

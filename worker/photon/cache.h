@@ -14,8 +14,8 @@ struct alignas(32) CachedLight {
   Rgb irradiance;  // [W m^-2]
   // Per group: irradiance as that eighth of the photons sees it, over the mean of all groups, in 1/kShareUnit.
   std::array<uint16_t, kVarianceGroups> group_share{};
-  // Side of the neighbourhood that was averaged, in cells (1, 3, 5, ...); 0: the cell is cut by other geometry, part of
-  // it may lie behind a wall, and its value is no evidence.
+  // Side of the neighbourhood that was averaged, in cells (1, 3, 5, ...); 0: its value is no evidence, since the cell
+  // is cut by other geometry and part of it may lie behind a wall, or is too small for photons to tell.
   uint8_t window = 1;
 
   static constexpr float kShareUnit = 65535.0f / kVarianceGroups;

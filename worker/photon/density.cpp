@@ -15,6 +15,8 @@ constexpr std::array<std::array<int, 2>, 8> kSteps = {
 
 // How far above the surface the short rays run, and how much of a cell other geometry may cut, in cells.
 constexpr float kLift = 0.02f, kMayCut = 0.04f;
+// Of a cell: photons that fall on less say nothing, and a single one a lot.
+constexpr double kLeastArea = 1.0 / 16;
 
 class Estimator {
  public:
@@ -178,19 +180,20 @@ class Estimator {
     const size_t i = Index(patch, x, y, side);
     if (cells_.cells()[i / 2].area <= 0) return;
     int radius = 0;
+    const double cell_area = static_cast<double>(patch.cell_side_m) * static_cast<double>(patch.cell_side_m);
+    const double least_area = kLeastArea * cell_area;
     if (!cut_[i] && open_[i] != 0) {
       const Sum widest = Flood(patch, x, y, side, options_.max_radius);
       const double per_area = static_cast<double>(widest.count) / widest.area;
-      const double cell_area = static_cast<double>(patch.cell_side_m) * static_cast<double>(patch.cell_side_m);
       while (radius < options_.max_radius &&
              per_area * cell_area * (2 * radius + 1) * (2 * radius + 1) < options_.target_count)
         ++radius;
-      if (radius == options_.max_radius) return Store(i, widest, radius);
+      if (radius == options_.max_radius) return Store(i, widest, radius, least_area);
     }
-    Store(i, Flood(patch, x, y, side, radius), radius);
+    Store(i, Flood(patch, x, y, side, radius), radius, least_area);
   }
 
-  void Store(size_t i, const Sum& sum, int radius) {
+  void Store(size_t i, const Sum& sum, int radius, double least_area) {
     if (sum.met <= 0) return;
     const double per_area = inverse_scale_ / sum.met;
     CachedLight& light = cache_.light[i];
@@ -200,7 +203,7 @@ class Estimator {
     for (size_t g = 0; g < kVarianceGroups && all > 0; ++g) {
       light.group_share[g] = static_cast<uint16_t>(65535 * (sum.group[g] / all) + 0.5);
     }
-    light.window = cut_[i] ? 0 : static_cast<uint8_t>(2 * radius + 1);
+    light.window = cut_[i] || sum.met < least_area ? 0 : static_cast<uint8_t>(2 * radius + 1);
   }
 
   const World& world_;
