@@ -78,7 +78,7 @@ TEST(RadianceCache, ChipsSmallerThanACellAreNotRead) {
         std::max(light.window == 0 ? brightest : most, Luminance(light.irradiance));
   }
   EXPECT_GT(brightest, 50.0f);  // some photon met a chip
-  EXPECT_LT(most, 20.0f);        // the lamp's own irradiance at its edge is 8 pi / 2
+  EXPECT_LT(most, 20.0f);       // the lamp's own irradiance at its edge is 8 pi / 2
 }
 
 // A small room of one lamp and a block, 8 x 12 texels of which matter.

@@ -304,6 +304,7 @@ float SmoothGrid::NoiseVariance(int x, int y) const {
 
 SmoothGrid::Calm SmoothGrid::Calmed(int x, int y) const {
   const SmoothCell& cell = At(x, y);
+  if (!(cell.variance > 0)) return {cell.value, 0, 0};
   Calm calm{cell.value, NoiseVariance(x, y), 0};
   std::array<float, kNeighbours.size()> values, variances;
   size_t count = 0;
@@ -366,6 +367,7 @@ float SmoothGrid::Choose(int x, int y, Steps* steps) const {
 
 float SmoothGrid::Agree(int x, int y) const {
   const SmoothCell& cell = At(x, y);
+  if (!(cell.variance > 0)) return cell.radius;
   std::array<float, 9> radii{cell.radius};
   size_t count = 1;
   for (size_t k = 0; k < kNeighbours.size(); ++k) {

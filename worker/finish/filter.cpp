@@ -18,21 +18,21 @@ namespace {
 
 class PageFilter {
  public:
-  PageFilter(const TexelMap& map, int page, Signal signal, std::span<TexelLight> lights)
-      : map_(map),
-        page_(page),
-        signal_(signal),
-        lights_(lights),
-        grid_(map.pages[page].width, map.pages[page].height, signal) {
+  PageFilter(const TexelMap& map, int page, std::span<TexelLight> lights)
+      : map_(map), page_(page), lights_(lights), grid_(map.pages[page].width, map.pages[page].height, Signal::kDirect) {
     for (const int32_t at : map.texel_at[page]) {
-      if (at >= 0) texels_.push_back(static_cast<uint32_t>(at));
+      if (at < 0) continue;
+      texels_.push_back(static_cast<uint32_t>(at));
+      Connect(texels_.back());
     }
+    grid_.MeasureRoom();
   }
 
   // Returns what is to be added to FilterCounters::bias_square.
-  double Run(std::vector<bool>& filtered) {
+  double Run(Signal signal, std::vector<bool>& filtered) {
+    signal_ = signal;
+    grid_ = SmoothGrid(std::move(grid_), signal);
     for (const uint32_t i : texels_) Put(i);
-    grid_.MeasureRoom();
     std::vector<SmoothGrid::Calm> calm(texels_.size());
     ForEach([&](size_t k, const Texel& texel) { calm[k] = grid_.Calmed(texel.x, texel.y); });
     ForEach([&](size_t k, const Texel& texel) { grid_.Take(texel.x, texel.y, calm[k]); });
@@ -76,13 +76,18 @@ class PageFilter {
   }
 
   void Put(uint32_t i) {
-    const Texel& texel = map_.texels[i];
     const TexelLight& light = lights_[i];
     if (!light.valid) return;
-    SmoothCell& cell = grid_.At(texel.x, texel.y);
+    SmoothCell& cell = grid_.At(map_.texels[i].x, map_.texels[i].y);
     cell.known = true;
     cell.value = ValueOf(light);
     cell.variance = Luminance(VarianceOf(light));
+  }
+
+  void Connect(uint32_t i) {
+    const Texel& texel = map_.texels[i];
+    const TexelLight& light = lights_[i];
+    if (!light.valid) return;
     for (int k = 0; k < 4; ++k) {
       if (!(light.open >> k & 1)) continue;
       const TexelLight* other = LightAt(texel.x + kNeighbours[k][0], texel.y + kNeighbours[k][1]);
@@ -103,7 +108,9 @@ class PageFilter {
 
   bool Smooth(const Texel& texel, LightPart& result, double& bias_square) const {
     if (!grid_.At(texel.x, texel.y).known) return false;
-    const SmoothGrid::Window window = grid_.WindowOf(texel.x, texel.y, grid_.Agree(texel.x, texel.y));
+    const float agreed = grid_.Agree(texel.x, texel.y);
+    if (agreed == 0) return false;
+    const SmoothGrid::Window window = grid_.WindowOf(texel.x, texel.y, agreed);
     const int radius = window.radius;
     if (radius == 0) return false;
     Numbers sum{};
@@ -170,7 +177,7 @@ class PageFilter {
 
   const TexelMap& map_;
   const int page_;
-  const Signal signal_;
+  Signal signal_ = Signal::kDirect;
   const std::span<TexelLight> lights_;
   SmoothGrid grid_;
   std::vector<uint32_t> texels_;
@@ -182,8 +189,9 @@ void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, Fil
   std::vector<bool> filtered(lights.size(), false);
   const bool noisy = std::any_of(lights.begin(), lights.end(),
                                  [](const TexelLight& light) { return MaxComponent(light.direct_variance) > 0; });
-  if (noisy) counters.bias_square += PageFilter(map, page, Signal::kDirect, lights).Run(filtered);
-  counters.bias_square += PageFilter(map, page, Signal::kIndirect, lights).Run(filtered);
+  PageFilter filter(map, page, lights);
+  if (noisy) counters.bias_square += filter.Run(Signal::kDirect, filtered);
+  counters.bias_square += filter.Run(Signal::kIndirect, filtered);
   counters.filtered += std::count(filtered.begin(), filtered.end(), true);
 }
 
