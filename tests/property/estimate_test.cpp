@@ -18,23 +18,33 @@ Scene BlackFurnace() {
   return builder.Build();
 }
 
+// A scene's photons in cells, and what they say.
+struct CachedScene {
+  PreparedLevel prepared;
+  SurfaceCells cells;
+  RadianceCache cache;
+
+  CachedScene(const Scene& scene, int photons_per_cell, uint32_t seed)
+      : prepared(PrepareInMemory(scene, {})), cells(SurfaceCells::Build(*prepared.world, 4096)) {
+    const EmissionGuide guide =
+        EmissionGuide::Learn(*prepared.world, *prepared.lights, prepared.layout, prepared.texels, 100, 0);
+    const PhotonPlan plan =
+        PlanPhotons(*prepared.lights, guide, static_cast<int64_t>(cells.cells().size()) * photons_per_cell, seed);
+    PhotonMap map;
+    map.flux.resize(2 * cells.cells().size());
+    SilentProgress progress;
+    EmitPhotons(*prepared.world, *prepared.lights, guide, cells, plan, 0, plan.photons, progress, map);
+    cache = EstimateDensity(*prepared.world, cells, map, plan, {}, progress);
+  }
+};
+
 // Area-weighted mean of the cache's front irradiance over flux / area.
 double CacheMean(int photons_per_cell, uint32_t seed) {
-  const PreparedLevel prepared = PrepareInMemory(BlackFurnace(), {});
-  const SurfaceCells cells = SurfaceCells::Build(*prepared.world, 4096);
-  const EmissionGuide guide =
-      EmissionGuide::Learn(*prepared.world, *prepared.lights, prepared.layout, prepared.texels, 100, 0);
-  const PhotonPlan plan =
-      PlanPhotons(*prepared.lights, guide, static_cast<int64_t>(cells.cells().size()) * photons_per_cell, seed);
-  PhotonMap map;
-  map.flux.resize(2 * cells.cells().size());
-  SilentProgress progress;
-  EmitPhotons(*prepared.world, *prepared.lights, guide, cells, plan, 0, plan.photons, progress, map);
-  const RadianceCache cache = EstimateDensity(*prepared.world, cells, map, plan, {}, progress);
+  const CachedScene room(BlackFurnace(), photons_per_cell, seed);
   double sum = 0, area = 0;
-  for (size_t i = 0; i < cells.cells().size(); ++i) {
-    const auto a = static_cast<double>(cells.cells()[i].area);
-    sum += a * static_cast<double>(cache.light[2 * i].irradiance.y);
+  for (size_t i = 0; i < room.cells.cells().size(); ++i) {
+    const auto a = static_cast<double>(room.cells.cells()[i].area);
+    sum += a * static_cast<double>(room.cache.light[2 * i].irradiance.y);
     area += a;
   }
   return sum / (kPi * area);
@@ -62,20 +72,11 @@ TEST(RadianceCache, ChipsSmallerThanACellAreNotRead) {
     const Vec3d a{place(), place(), place()};
     builder.AddTriangle(a, a + Vec3d{0.002, 0, 0}, a + Vec3d{0, 0, -0.002}, {.lightmapped = false});
   }
-  const PreparedLevel prepared = PrepareInMemory(builder.Build(), {});
-  const SurfaceCells cells = SurfaceCells::Build(*prepared.world, 4096);
-  const EmissionGuide guide =
-      EmissionGuide::Learn(*prepared.world, *prepared.lights, prepared.layout, prepared.texels, 100, 0);
-  const PhotonPlan plan = PlanPhotons(*prepared.lights, guide, 400000, 0);
-  PhotonMap map;
-  map.flux.resize(2 * cells.cells().size());
-  SilentProgress progress;
-  EmitPhotons(*prepared.world, *prepared.lights, guide, cells, plan, 0, plan.photons, progress, map);
-  const RadianceCache cache = EstimateDensity(*prepared.world, cells, map, plan, {}, progress);
+  const CachedScene chips(builder.Build(), 70, 0);
   float most = 0, brightest = 0;
-  for (const CachedLight& light : cache.light) {
-    (light.window == 0 ? brightest : most) =
-        std::max(light.window == 0 ? brightest : most, Luminance(light.irradiance));
+  for (const CachedLight& light : chips.cache.light) {
+    float& brighter = light.window == 0 ? brightest : most;
+    brighter = std::max(brighter, Luminance(light.irradiance));
   }
   EXPECT_GT(brightest, 50.0f);  // some photon met a chip
   EXPECT_LT(most, 20.0f);       // the lamp's own irradiance at its edge is 8 pi / 2
