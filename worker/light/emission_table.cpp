@@ -11,43 +11,41 @@
 namespace bakewell {
 namespace {
 
-constexpr int kLeastSide = 8, kMostSide = 256;
 constexpr float kEven = 0.5f;         // least over greatest luminance, below which a triangle varies
 constexpr double kBoundShare = 0.25;  // of the points, by the bound
+constexpr double kMostTexels = 2048;  // under a cell, to know its bound: 7,000 along a triangle
 
-// Side of a pattern of `per_texel` points a texel along either axis.
-int PatternSide(const World& world, uint32_t triangle, float per_texel) {
-  const float points = per_texel * world.GlowTexelsAcross(triangle);
-  return points > kLeastSide ? static_cast<int>(std::min(points, static_cast<float>(kMostSide))) : kLeastSide;
+// What a cell's points show.
+struct Seen {
+  Vec3d sum{};         // radiance
+  double squares = 0;  // of luminances
+  float least = std::numeric_limits<float>::infinity(), most = 0;
+};
+
+// points x points of the cell of `size` at `corner`.
+Seen LookAt(const World& world, uint32_t triangle, bool both, Vec2f corner, float size, int points) {
+  const float step = size / static_cast<float>(points);
+  Seen seen;
+  for (int k = 0; k < points * points; ++k) {
+    const Vec2f b = TriangleFromSquare(
+        corner + Vec2f{(static_cast<float>(k % points) + 0.5f) * step, (static_cast<float>(k / points) + 0.5f) * step});
+    Rgb glow = world.GlowAt(triangle, b.x, b.y, false);
+    if (both) glow += world.GlowAt(triangle, b.x, b.y, true);
+    const float luminance = Luminance(glow);
+    seen.sum += ToDouble(glow);
+    seen.squares += static_cast<double>(luminance) * static_cast<double>(luminance);
+    seen.least = std::min(seen.least, luminance);
+    seen.most = std::max(seen.most, luminance);
+  }
+  return seen;
 }
 
 }  // namespace
 
-Glow GlowOf(const World& world, uint32_t triangle) {
-  const Material& material = world.MaterialOf(world.triangles()[triangle]);
-  if (material.emission_texture.texture < 0 && world.IsAlwaysMet(triangle)) return {material.emission, false};
-  const int side = PatternSide(world, triangle, 1), sides = material.double_sided ? 2 : 1;
-  const float step = 1.0f / static_cast<float>(side);
-  Rgb sum;
-  float least = std::numeric_limits<float>::infinity(), most = 0;
-  for (int y = 0; y < side; ++y) {
-    for (int x = 0; x < side; ++x) {
-      const Vec2f b =
-          TriangleFromSquare({(static_cast<float>(x) + 0.5f) * step, (static_cast<float>(y) + 0.5f) * step});
-      float luminance = 0;
-      for (int k = 0; k < sides; ++k) {
-        const Rgb glow = world.GlowAt(triangle, b.x, b.y, k == 1);
-        sum += glow * (step * step);
-        luminance += Luminance(glow);
-      }
-      least = std::min(least, luminance);
-      most = std::max(most, luminance);
-    }
-  }
-  return {sum / static_cast<float>(sides), least < kEven * most};
+int EmissionTable::SideFor(const World& world, uint32_t triangle) {
+  const float cells = 2 * world.GlowTexelsAcross(triangle);
+  return cells > kLeastSide ? static_cast<int>(std::min(cells, static_cast<float>(kMostSide))) : kLeastSide;
 }
-
-int EmissionTable::SideFor(const World& world, uint32_t triangle) { return PatternSide(world, triangle, 2); }
 
 int EmissionTable::LargestSide(std::span<const int> sides, size_t bytes) {
   for (int largest = kMostSide; largest >= kLeastSide; largest /= 2) {
@@ -61,35 +59,45 @@ int EmissionTable::LargestSide(std::span<const int> sides, size_t bytes) {
   return 0;
 }
 
-EmissionTable::EmissionTable(const World& world, uint32_t triangle, int side) {
+int EmissionTable::PointsFor(const World& world, uint32_t triangle, int side, double most_points) {
+  const double cells = side;
+  const double wanted = std::min(static_cast<double>(world.GlowTexelsAcross(triangle)), std::sqrt(most_points)) / cells;
+  return wanted > kLeastPoints ? static_cast<int>(std::min(std::ceil(wanted), static_cast<double>(kMostPoints)))
+                               : kLeastPoints;
+}
+
+EmissionTable::EmissionTable(const World& world, uint32_t triangle, int side, int points) {
   const bool both = world.MaterialOf(world.triangles()[triangle]).double_sided;
-  const int points = std::max(2, (PatternSide(world, triangle, 1) + side - 1) / side);  // along a cell
-  const float step = 1.0f / static_cast<float>(side), point_step = step / static_cast<float>(points);
+  const float size = 1.0f / static_cast<float>(side);
   std::vector<Rgb> bound;
   std::vector<double> brightness;  // root mean square, times `points`
   double brightness_sum = 0, bound_sum = 0;
-  Vec3d sum;
+  Vec3d sum, bounds;
+  Seen all;
   for (int cell = 0; cell < side * side; ++cell) {
-    const Vec2f corner{static_cast<float>(cell % side) * step, static_cast<float>(cell / side) * step};
+    const Vec2f corner{static_cast<float>(cell % side) * size, static_cast<float>(cell / side) * size};
     // A cell on the diagonal is two triangles, whose corners are among these as well.
-    bound.push_back(world.MostGlow(
-        triangle, {TriangleFromSquare(corner), TriangleFromSquare(corner + Vec2f{step, 0}),
-                   TriangleFromSquare(corner + Vec2f{0, step}), TriangleFromSquare(corner + Vec2f{step, step})}));
-    double squares = 0;
-    for (int k = 0; k < points * points && MaxComponent(bound.back()) > 0; ++k) {
-      const Vec2f b = TriangleFromSquare(corner + Vec2f{(static_cast<float>(k % points) + 0.5f) * point_step,
-                                                        (static_cast<float>(k / points) + 0.5f) * point_step});
-      Rgb glow = world.GlowAt(triangle, b.x, b.y, false);
-      if (both) glow += world.GlowAt(triangle, b.x, b.y, true);
-      sum += ToDouble(glow);
-      squares += static_cast<double>(Luminance(glow)) * static_cast<double>(Luminance(glow));
-    }
-    brightness.push_back(std::sqrt(squares));
+    const std::array<Vec2f, 4> corners{TriangleFromSquare(corner), TriangleFromSquare(corner + Vec2f{size, 0}),
+                                       TriangleFromSquare(corner + Vec2f{0, size}),
+                                       TriangleFromSquare(corner + Vec2f{size, size})};
+    bound.push_back(world.GlowOver(triangle, corners, kMostTexels).most);
+    const bool dark = MaxComponent(bound.back()) <= 0;
+    const Seen seen = dark ? Seen{.least = 0} : LookAt(world, triangle, both, corner, size, points);
+    sum += seen.sum;
+    bounds += ToDouble(bound.back());
+    all.least = std::min(all.least, seen.least);
+    all.most = std::max(all.most, seen.most);
+    brightness.push_back(std::sqrt(seen.squares));
     brightness_sum += brightness.back();
     bound_sum += static_cast<double>(Luminance(bound.back()));
   }
-  mean_ = ToFloat(sum / (static_cast<double>(bound.size()) * points * points * (both ? 2 : 1)));
+  const double cells = static_cast<double>(bound.size()), of_cell = static_cast<double>(points) * points;
+  mean_ = ToFloat(sum / (cells * of_cell * (both ? 2 : 1)));
+  const bool resolved = world.GlowTexelsAcross(triangle) <= static_cast<float>(side * points);
+  if (MaxComponent(mean_) <= 0 && !resolved) mean_ = ToFloat(bounds / (cells * of_cell));
+  varies_ = all.least < kEven * all.most || all.most <= 0;
 
+  if (bound_sum <= 0) return;
   const double seen_share = brightness_sum > 0 ? (1 - kBoundShare) / brightness_sum : 0;
   std::vector<float> weights;
   for (size_t i = 0; i < bound.size(); ++i) {

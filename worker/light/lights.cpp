@@ -12,7 +12,6 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-constexpr size_t kTableBytes = size_t{64} << 20;  // of all emission tables
 // Of the points on a near triangle whose emission varies, by emission; the others by solid angle.
 constexpr float kTableShare = 0.9f;
 
@@ -26,38 +25,19 @@ float SpotFalloff(const PunctualLight& light, float cos_angle) {
   return x * x;
 }
 
-LightSet::LightSet(const World& world, const Environment& environment) : world_(world), environment_(environment) {
+LightSet::LightSet(const World& world, const Environment& environment)
+    : world_(world), patterns_(world), environment_(environment) {
   for (const PunctualLight& light : world.scene().lights) {
     if (MaxComponent(light.intensity) <= 0) continue;
     (light.type == LightType::kDirectional ? directionals_ : locals_).push_back(light);
     if (light.type != LightType::kDirectional) continue;
     discs_.push_back({FrameFromHint(-light.direction, light.tangent), std::sin(0.5f * light.angular_diameter_rad)});
   }
-  std::vector<size_t> varying;  // of emissive_
-  for (uint32_t k = 0; k < world.triangles().size(); ++k) {
-    if (!world.Emits(k)) continue;
-    const Triangle& t = world.triangles()[k];
-    const Glow glow = GlowOf(world, k);
-    if (MaxComponent(glow.mean) <= 0) continue;
+  for (const auto& [triangle, mean, table] : patterns_.emitters()) {
     if (light_of_triangle_.empty()) light_of_triangle_.assign(world.triangles().size(), -1);
-    light_of_triangle_[k] = local_count();
-    if (glow.varies) varying.push_back(emissive_.size());
-    emissive_.push_back({k, 0.5f * Length(Cross(t.e1, t.e2)), glow.mean, world.MaterialOf(t).double_sided});
-  }
-  MakeTables(varying);
-}
-
-void LightSet::MakeTables(std::span<const size_t> varying) {
-  std::vector<int> sides;
-  for (const size_t i : varying) sides.push_back(EmissionTable::SideFor(world_, emissive_[i].triangle));
-  const int largest = EmissionTable::LargestSide(sides, kTableBytes);
-  if (largest == 0) return;
-  tables_.reserve(varying.size());
-  for (size_t k = 0; k < varying.size(); ++k) {
-    EmissiveTriangle& light = emissive_[varying[k]];
-    light.table = static_cast<int>(k);
-    tables_.emplace_back(world_, light.triangle, std::min(sides[k], largest));
-    if (MaxComponent(tables_[k].mean()) > 0) light.mean_radiance = tables_[k].mean();
+    light_of_triangle_[triangle] = local_count();
+    const Triangle& t = world.triangles()[triangle];
+    emissive_.push_back({triangle, 0.5f * Length(Cross(t.e1, t.e2)), mean, world.MaterialOf(t).double_sided, table});
   }
 }
 

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <span>
 #include <vector>
 
-#include "worker/light/emission_table.h"
+#include "worker/light/emission_patterns.h"
 #include "worker/light/environment.h"
 #include "worker/trace/world.h"
 
@@ -49,7 +48,7 @@ class LightSet {
 
   // Null where a triangle glows evenly, about, or has no table because very many others want one.
   const EmissionTable* TableOf(const EmissiveTriangle& light) const {
-    return light.table < 0 ? nullptr : &tables_[static_cast<size_t>(light.table)];
+    return light.table < 0 ? nullptr : &patterns_.table(light.table);
   }
 
   // A point of local light `light` as seen from `position`. pdf: uniform in solid angle for near triangles, in area for
@@ -73,18 +72,16 @@ class LightSet {
     Frame across;  // n: towards the light
     float sin_radius = 0;
   };
-  // For those whose emission varies, elements of emissive_.
-  void MakeTables(std::span<const size_t> varying);
   LightSample SampleTriangle(const EmissiveTriangle& light, Vec3f position, Vec2f u) const;
   float Pdf(const EmissiveTriangle& light, float solid_angle, Vec2f barycentrics, float cos_light,
             float distance) const;
   float ImportanceOfTriangle(const EmissiveTriangle& light, Vec3f position, Vec3f normal, float radius) const;
 
   const World& world_;
+  EmissionPatterns patterns_;
   std::vector<PunctualLight> locals_, directionals_;
   std::vector<Disc> discs_;  // of the directional lights
   std::vector<EmissiveTriangle> emissive_;
-  std::vector<EmissionTable> tables_;
   std::vector<int> light_of_triangle_;  // one per triangle, empty where nothing emits
   EnvironmentLight environment_;
 };

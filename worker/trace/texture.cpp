@@ -1,7 +1,13 @@
 #include "worker/trace/texture.h"
 
+#include <immintrin.h>
+
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
 
 namespace bakewell {
 namespace {
@@ -19,20 +25,24 @@ const std::array<float, 256> kSrgb = [] {
 
 Vec2f Transform(const TextureRef& ref, Vec2f uv) {
   const Vec2f scaled{uv.x * ref.scale.x, uv.y * ref.scale.y};
+  if (ref.rotation_rad == 0) return ref.offset + scaled;
   const float c = std::cos(ref.rotation_rad), s = std::sin(ref.rotation_rad);
   return {ref.offset.x + c * scaled.x + s * scaled.y, ref.offset.y - s * scaled.x + c * scaled.y};
 }
 
-int Wrap(int i, int size, WrapMode mode) {
-  if (mode == WrapMode::kClampToEdge) return std::clamp(i, 0, size - 1);
-  const int period = mode == WrapMode::kRepeat ? size : 2 * size;
-  const int m = ((i % period) + period) % period;
-  return m < size ? m : period - 1 - m;
+// The column or row that texel number `i` of an endless texture is.
+size_t Wrap(int i, int size, WrapMode mode) {
+  if (i < 0 || i >= size) {
+    if (mode == WrapMode::kClampToEdge) return static_cast<size_t>(std::clamp(i, 0, size - 1));
+    const int period = mode == WrapMode::kRepeat ? size : 2 * size;
+    i %= period;
+    if (i < 0) i += period;
+    if (i >= size) i = period - 1 - i;
+  }
+  return static_cast<size_t>(i);
 }
 
-const uint8_t* TexelAt(const Texture& texture, int x, int y) {
-  const size_t column = static_cast<size_t>(Wrap(x, texture.width, texture.wrap_u));
-  const size_t row = static_cast<size_t>(Wrap(y, texture.height, texture.wrap_v));
+const uint8_t* TexelAt(const Texture& texture, size_t column, size_t row) {
   return texture.rgba.data() + 4 * (row * static_cast<size_t>(texture.width) + column);
 }
 
@@ -50,17 +60,20 @@ void Filter(const Texture& texture, const TextureRef& ref, Vec2f uv, Add add) {
   const Vec2f p = Transform(ref, uv);
   const float x = Bound(p.x, texture.wrap_u) * static_cast<float>(texture.width);
   const float y = Bound(p.y, texture.wrap_v) * static_cast<float>(texture.height);
+  const auto column = [&](int i) { return Wrap(i, texture.width, texture.wrap_u); };
+  const auto row = [&](int i) { return Wrap(i, texture.height, texture.wrap_v); };
   if (texture.nearest) {
-    add(TexelAt(texture, static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y))), 1.0f);
+    add(TexelAt(texture, column(static_cast<int>(std::floor(x))), row(static_cast<int>(std::floor(y)))), 1.0f);
     return;
   }
   const float fx = std::floor(x - 0.5f), fy = std::floor(y - 0.5f);
   const float wx = x - 0.5f - fx, wy = y - 0.5f - fy;
-  const int ix = static_cast<int>(fx), iy = static_cast<int>(fy);
-  add(TexelAt(texture, ix, iy), (1 - wx) * (1 - wy));
-  add(TexelAt(texture, ix + 1, iy), wx * (1 - wy));
-  add(TexelAt(texture, ix, iy + 1), (1 - wx) * wy);
-  add(TexelAt(texture, ix + 1, iy + 1), wx * wy);
+  const size_t x0 = column(static_cast<int>(fx)), x1 = column(static_cast<int>(fx) + 1);
+  const size_t y0 = row(static_cast<int>(fy)), y1 = row(static_cast<int>(fy) + 1);
+  add(TexelAt(texture, x0, y0), (1 - wx) * (1 - wy));
+  add(TexelAt(texture, x1, y0), wx * (1 - wy));
+  add(TexelAt(texture, x0, y1), (1 - wx) * wy);
+  add(TexelAt(texture, x1, y1), wx * wy);
 }
 
 }  // namespace
@@ -75,52 +88,95 @@ Rgb SampleColor(const Texture& texture, const TextureRef& ref, Vec2f uv) {
 
 namespace {
 
-// Calls visit(texel) for all within `margin` texels of the bounding box of some texture coordinates. False, without a
-// call, where those are more than `most`, or too far away.
-template <typename Visit>
-bool VisitAround(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners, float margin,
-                 double most, Visit visit) {
-  constexpr float kFarthest = 1 << 20;  // texels; beyond, their numbers are not exact
+struct TexelBox {
+  int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
+};
+
+// The texels that the filter reaches from the bounding box of some texture coordinates; none where those are more than
+// `most`, or so far away that rounding reaches beyond a quarter of a texel.
+std::optional<TexelBox> BoxAround(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners,
+                                  double most) {
+  constexpr float kRounding = 0x1p-21f;  // interpolation, transform and scaling: eight roundings
   const Vec2f size{static_cast<float>(texture.width), static_cast<float>(texture.height)};
-  Vec2f low{kFarthest, kFarthest}, high = low * -1.0f;
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  Vec2f low{kInfinity, kInfinity}, high{-kInfinity, -kInfinity};
+  float greatest = 2;  // of what is added up to a coordinate [textures]; where it is wrapped to is below 2
   for (const Vec2f corner : corners) {
     const Vec2f p = Transform(ref, corner);
-    if (!std::isfinite(p.x) || !std::isfinite(p.y)) return false;
-    low = {std::min(low.x, p.x * size.x - margin), std::min(low.y, p.y * size.y - margin)};
-    high = {std::max(high.x, p.x * size.x + margin), std::max(high.y, p.y * size.y + margin)};
+    if (!std::isfinite(p.x) || !std::isfinite(p.y)) return std::nullopt;
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+    greatest = std::max(greatest, std::fabs(corner.x * ref.scale.x) + std::fabs(corner.y * ref.scale.y) +
+                                      std::fabs(ref.offset.x) + std::fabs(ref.offset.y));
   }
-  if (low.x < -kFarthest || low.y < -kFarthest || high.x > kFarthest || high.y > kFarthest) return false;
-  if (static_cast<double>(high.x - low.x) * static_cast<double>(high.y - low.y) > most) return false;
-  const int x_end = static_cast<int>(std::floor(high.x)) + 1, y_end = static_cast<int>(std::floor(high.y)) + 1;
-  for (int y = static_cast<int>(std::floor(low.y)); y < y_end; ++y) {
-    for (int x = static_cast<int>(std::floor(low.x)); x < x_end; ++x) visit(TexelAt(texture, x, y));
-  }
-  return true;
+  const float rounding = kRounding * greatest * std::max(size.x, size.y);
+  if (!(rounding < 0.25f)) return std::nullopt;
+  const float reach = rounding + (texture.nearest ? 0.0f : 0.5f);
+  const auto floor = [](float x) { return static_cast<int>(std::floor(x)); };
+  const TexelBox box{floor(low.x * size.x - reach), floor(high.x * size.x + reach) + 1, floor(low.y * size.y - reach),
+                     floor(high.y * size.y + reach) + 1};
+  const double texels = static_cast<double>(box.x_end - box.x_begin) * static_cast<double>(box.y_end - box.y_begin);
+  return texels <= most ? std::optional(box) : std::nullopt;
 }
+
+// Least and greatest of each channel, eight texels at a time where they lie side by side.
+class Extremes {
+ public:
+  void Add(const uint8_t* texels, int count) {
+    for (; count >= 8; count -= 8, texels += 32) {
+      AddEight(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(texels)));
+    }
+    for (; count > 0; --count, texels += 4) {
+      int texel;
+      std::memcpy(&texel, texels, sizeof texel);
+      AddEight(_mm256_set1_epi32(texel));
+    }
+  }
+  using Texel = std::array<uint8_t, 4>;
+  std::pair<Texel, Texel> Get() const {
+    Texel least{255, 255, 255, 255}, most{};
+    std::array<uint8_t, 32> all_least, all_most;
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(all_least.data()), least_);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(all_most.data()), most_);
+    for (size_t i = 0; i < all_least.size(); ++i) {
+      least[i % 4] = std::min(least[i % 4], all_least[i]);
+      most[i % 4] = std::max(most[i % 4], all_most[i]);
+    }
+    return {least, most};
+  }
+
+ private:
+  void AddEight(__m256i texels) {
+    least_ = _mm256_min_epu8(least_, texels);
+    most_ = _mm256_max_epu8(most_, texels);
+  }
+  __m256i least_ = _mm256_set1_epi8(-1), most_ = _mm256_setzero_si256();
+};
 
 }  // namespace
 
-TexelBound MostOver(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners) {
-  if (texture.width <= 0 || texture.height <= 0) return {{0, 0, 0}, 0};
-  constexpr float kRounding = 0.05f;  // texels: 2^-24 of a coordinate of 2^20, nearly
-  std::array<uint8_t, 4> most{};
-  const auto visit = [&](const uint8_t* texel) {
-    for (size_t c = 0; c < 4; ++c) most[c] = std::max(most[c], texel[c]);
+TexelRange RangeOver(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners,
+                     double most_texels) {
+  if (texture.width <= 0 || texture.height <= 0) return {.most = {}, .most_alpha = 0};
+  const std::optional<TexelBox> box = BoxAround(texture, ref, corners, most_texels);
+  if (!box) return {};
+  Extremes extremes;
+  for (int y = box->y_begin; y < box->y_end; ++y) {
+    const size_t row = Wrap(y, texture.height, texture.wrap_v);
+    if (box->x_begin >= 0 && box->x_end <= texture.width) {
+      extremes.Add(TexelAt(texture, static_cast<size_t>(box->x_begin), row), box->x_end - box->x_begin);
+      continue;
+    }
+    for (int x = box->x_begin; x < box->x_end; ++x) {
+      extremes.Add(TexelAt(texture, Wrap(x, texture.width, texture.wrap_u), row), 1);
+    }
+  }
+  const auto [least, most] = extremes.Get();
+  const auto color = [](const std::array<uint8_t, 4>& texel) {
+    return Rgb{kSrgb[texel[0]], kSrgb[texel[1]], kSrgb[texel[2]]};
   };
-  if (!VisitAround(texture, ref, corners, kRounding + (texture.nearest ? 0.0f : 0.5f), 256, visit)) return {};
-  return {{kSrgb[most[0]], kSrgb[most[1]], kSrgb[most[2]]}, static_cast<float>(most[3]) / 255.0f};
-}
-
-std::pair<float, float> AlphaRange(const Texture& texture, const TextureRef& ref, const std::array<Vec2f, 3>& corners) {
-  constexpr float kMargin = 2;  // texels: the filter's reach and rounding
-  if (texture.width <= 0 || texture.height <= 0) return {0, 0};
-  uint8_t least = 255, most = 0;
-  const auto visit = [&](const uint8_t* texel) {
-    least = std::min(least, texel[3]);
-    most = std::max(most, texel[3]);
-  };
-  if (!VisitAround(texture, ref, corners, kMargin, 65536, visit)) return {0, 1};
-  return {static_cast<float>(least) / 255.0f, static_cast<float>(most) / 255.0f};
+  const auto alpha = [](const std::array<uint8_t, 4>& texel) { return static_cast<float>(texel[3]) / 255.0f; };
+  return {color(least), color(most), alpha(least), alpha(most)};
 }
 
 float SampleAlpha(const Texture& texture, const TextureRef& ref, Vec2f uv) {

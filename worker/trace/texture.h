@@ -1,8 +1,6 @@
 #pragma once
 
-#include <array>
 #include <span>
-#include <utility>
 
 #include "core/scene/scene.h"
 
@@ -15,17 +13,13 @@ Rgb SampleColor(const Texture& texture, const TextureRef& ref, Vec2f uv);
 // Alpha in [0,1], likewise.
 float SampleAlpha(const Texture& texture, const TextureRef& ref, Vec2f uv);
 
-// Bounds of SampleColor and SampleAlpha from above.
-struct TexelBound {
-  Rgb color{1, 1, 1};
-  float alpha = 1;
+// Bounds of SampleColor and SampleAlpha.
+struct TexelRange {
+  Rgb least{}, most{1, 1, 1};
+  float least_alpha = 0, most_alpha = 1;
 };
-// Over the hull of some texture coordinates, from the texels that the filter reaches from its bounding box; 1 where
-// that holds more than 256 of them.
-TexelBound MostOver(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners);
-
-// Bounds of SampleAlpha over the triangle with these texture coordinates, from the texels of its bounding box: {least,
-// most}. {0, 1} where that holds more than 65,536 of them.
-std::pair<float, float> AlphaRange(const Texture& texture, const TextureRef& ref, const std::array<Vec2f, 3>& corners);
+// Over the hull of some texture coordinates, from the texels that the filter reaches from its bounding box; 0 to 1
+// where that holds more than `most_texels` of them.
+TexelRange RangeOver(const Texture& texture, const TextureRef& ref, std::span<const Vec2f> corners, double most_texels);
 
 }  // namespace bakewell

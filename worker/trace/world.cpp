@@ -1,5 +1,6 @@
 #include "worker/trace/world.h"
 
+#include <absl/container/flat_hash_map.h>
 #include <embree3/rtcore.h>
 #include <immintrin.h>
 #include <tbb/task_arena.h>
@@ -11,7 +12,6 @@
 #include "core/base/check.h"
 #include "worker/sample/hash.h"
 #include "worker/trace/coincident.h"
-#include "worker/trace/texture.h"
 
 namespace bakewell {
 
@@ -63,7 +63,7 @@ bool IsOpaque(const Material& material, BackfaceMode backfaces) {
   return material.alpha_mode == AlphaMode::kOpaque && (backfaces != BackfaceMode::kPass || material.double_sided);
 }
 
-constexpr float kAlphaRounding = 1e-5f;
+constexpr double kMostAlphaTexels = 65536;  // that are looked at to know whether a triangle is opaque
 
 // True where rounding tilts the plane that Embree intersects by more than SurfacePoint::offset allows for: the cross
 // product of two edges is off by about 2^-23 |e1| |e2|.
@@ -116,6 +116,12 @@ absl::Status World::BuildTriangles() {
 
 // A triangle whose alpha lets every ray pass, or none, need not be asked.
 void World::SortByAlpha(bool look) {
+  absl::flat_hash_map<GlowInputs, std::pair<float, float>> looked_at;  // leaves share texture coordinates
+  const auto alpha_of = [&](uint32_t k) {
+    const auto [found, is_new] = looked_at.try_emplace(GlowInputsOf(k));
+    if (is_new) found->second = AlphaOver(triangles_[k], kTriangleCorners, kMostAlphaTexels);
+    return found->second;
+  };
   for (uint32_t k = 0; k < triangles_.size(); ++k) {
     const Triangle& t = triangles_[k];
     const Material& material = MaterialOf(t);
@@ -128,25 +134,15 @@ void World::SortByAlpha(bool look) {
     const auto members = MembersOf(GroupOf(k));
     const bool hidden = GroupOf(k) != 0 && std::find(members.begin(), members.end(), k) == members.end();
     if (hidden) continue;
-    const auto [least, most] = look && has_alpha ? AlphaRange(t) : std::pair(0.0f, 1.0f);
+    const auto [least, most] = look && has_alpha ? alpha_of(k) : std::pair(0.0f, 1.0f);
     const bool mask = material.alpha_mode == AlphaMode::kMask;
-    const bool passes = mask ? most < material.alpha_cutoff - kAlphaRounding : most <= 0;
-    const bool stops = !has_alpha || (mask ? least >= material.alpha_cutoff + kAlphaRounding : least >= 1);
+    const bool passes = mask ? most < material.alpha_cutoff - kCutoffRounding : most <= 0;
+    const bool stops = !has_alpha || (mask ? least >= material.alpha_cutoff + kCutoffRounding : least >= 1);
     const bool whole =
         stops && (backfaces_ != BackfaceMode::kPass || material.double_sided) && !IsNeedle(t) && members.size() <= 1;
     opaque_alpha_.skipped += has_alpha && (passes || whole) ? 1 : 0;
     if (!passes) of_geometry_[whole ? kStops : kAsks].push_back(k);
   }
-}
-
-std::pair<float, float> World::AlphaRange(const Triangle& t) const {
-  const Material& material = MaterialOf(t);
-  const TextureRef& ref = material.base_texture;
-  if (ref.texture < 0) return {material.base_alpha, material.base_alpha};
-  const std::array<Vec2f, 3> corners = {TexcoordAt(t, ref.texcoord, 0, 0), TexcoordAt(t, ref.texcoord, 1, 0),
-                                        TexcoordAt(t, ref.texcoord, 0, 1)};
-  const auto [least, most] = bakewell::AlphaRange(scene_.textures[ref.texture], ref, corners);
-  return {material.base_alpha * least, material.base_alpha * most};
 }
 
 void World::AddGeometry(Geometry geometry_id) {
@@ -327,62 +323,6 @@ Rgb World::AlbedoAt(const Hit& hit) const {
   }
   const auto limit = [this](float x) { return std::clamp(x, 0.0f, albedo_limit_); };
   return {limit(albedo.x), limit(albedo.y), limit(albedo.z)};
-}
-
-bool World::Emits(uint32_t triangle) const { return MaxComponent(MaterialOf(triangles_[triangle]).emission) > 0; }
-
-Rgb World::FrontEmissionAt(uint32_t triangle, float u, float v) const {
-  const Triangle& t = triangles_[triangle];
-  const Material& material = MaterialOf(t);
-  if (material.emission_texture.texture < 0 || MaxComponent(material.emission) <= 0) return material.emission;
-  const Vec2f uv = TexcoordAt(t, material.emission_texture.texcoord, u, v);
-  return material.emission *
-         SampleColor(scene_.textures[material.emission_texture.texture], material.emission_texture, uv);
-}
-
-float World::GlowTexelsAcross(uint32_t triangle) const {
-  const Triangle& t = triangles_[triangle];
-  const Material& material = MaterialOf(t);
-  const auto across = [&](const TextureRef& ref) {
-    if (ref.texture < 0) return 0.0f;
-    const Texture& texture = scene_.textures[ref.texture];
-    const auto length = [&](Vec2f d) {
-      return std::hypot(d.x * ref.scale.x, d.y * ref.scale.y) *
-             static_cast<float>(std::max(texture.width, texture.height));
-    };
-    const Vec2f corner = TexcoordAt(t, ref.texcoord, 0, 0);
-    return std::max(length(TexcoordAt(t, ref.texcoord, 1, 0) - corner),
-                    length(TexcoordAt(t, ref.texcoord, 0, 1) - corner));
-  };
-  const float alpha = material.alpha_mode == AlphaMode::kOpaque ? 0 : across(material.base_texture);
-  return std::max(across(material.emission_texture), alpha);
-}
-
-Rgb World::EmissionAt(const Hit& hit) const {
-  if (hit.back && !MaterialOf(triangles_[hit.triangle]).double_sided) return {};
-  return FrontEmissionAt(hit.triangle, hit.u, hit.v);
-}
-
-Rgb World::GlowAt(uint32_t triangle, float u, float v, bool back) const {
-  if (back && !MaterialOf(triangles_[triangle]).double_sided) return {};
-  const float share = ShareMet(triangle, u, v, back);
-  return share > 0 ? FrontEmissionAt(triangle, u, v) * share : Rgb{};
-}
-
-Rgb World::MostGlow(uint32_t triangle, const std::array<Vec2f, 4>& points) const {
-  const Triangle& t = triangles_[triangle];
-  const Material& material = MaterialOf(t);
-  const auto most = [&](const TextureRef& ref) {
-    if (ref.texture < 0) return TexelBound{};
-    std::array<Vec2f, 4> corners;
-    for (size_t i = 0; i < corners.size(); ++i) corners[i] = TexcoordAt(t, ref.texcoord, points[i].x, points[i].y);
-    return MostOver(scene_.textures[ref.texture], ref, corners);
-  };
-  const Rgb emission = material.emission * most(material.emission_texture).color;
-  if (material.alpha_mode == AlphaMode::kOpaque || MaxComponent(emission) <= 0) return emission;
-  const float alpha = material.base_alpha * most(material.base_texture).alpha;
-  if (material.alpha_mode == AlphaMode::kMask) return alpha < material.alpha_cutoff - kAlphaRounding ? Rgb{} : emission;
-  return emission * std::clamp(alpha, 0.0f, 1.0f);
 }
 
 }  // namespace bakewell

@@ -11,7 +11,9 @@
 #include "core/artifact/settings.h"
 #include "core/base/status.h"
 #include "core/scene/scene.h"
+#include "worker/trace/glow.h"
 #include "worker/trace/ray.h"
+#include "worker/trace/texture.h"
 
 struct RTCFilterFunctionNArguments;
 
@@ -69,14 +71,17 @@ class World {
   bool IsAlwaysMet(uint32_t triangle) const { return triangle < opaque_count_; }  // ShareMet is 1 everywhere
   // Mean radiance that those rays find: EmissionAt by ShareMet.
   Rgb GlowAt(uint32_t triangle, float u, float v, bool back) const;
-  // Bound of GlowAt, of either side and each channel, over the hull of points of a triangle (barycentrics).
-  Rgb MostGlow(uint32_t triangle, const std::array<Vec2f, 4>& points) const;
   bool Emits(uint32_t triangle) const;
+  // Bounds of GlowAt of the sides that glow, each channel, over the hull of points of a triangle (barycentrics) that
+  // reaches `most_texels` of a texture at most: those of any texture beyond that.
+  GlowRange GlowOver(uint32_t triangle, std::span<const Vec2f> points, double most_texels) const;
+  GlowInputs GlowInputsOf(uint32_t triangle) const;
   // How many texels of the textures that say how it glows, emission and alpha, lie along a triangle's longer edge of e1
   // and e2, about; 0 without textures.
   float GlowTexelsAcross(uint32_t triangle) const;
 
  private:
+  static constexpr float kCutoffRounding = 1e-5f;  // alpha nearer to the cutoff may be on either side of it
   struct Device;
   struct TraceContext;
   World(const Scene& scene, BackfaceMode backfaces, float albedo_limit);
@@ -87,7 +92,10 @@ class World {
   absl::Status BuildDevice();
   enum Geometry : uint8_t { kStops, kAsks };
   void AddGeometry(Geometry geometry);
-  std::pair<float, float> AlphaRange(const Triangle& triangle) const;  // least and most
+  // Least and most alpha over the hull of points of a triangle, as GlowOver.
+  std::pair<float, float> AlphaOver(const Triangle& triangle, std::span<const Vec2f> points, double most_texels) const;
+  TexelRange TexelsOver(const Triangle& triangle, const TextureRef& ref, std::span<const Vec2f> points,
+                        double most_texels) const;
   uint32_t TriangleOf(uint32_t geometry, uint32_t primitive) const {
     return geometry == kStops && primitive < opaque_count_ ? primitive : of_geometry_[geometry][primitive];
   }

@@ -1,9 +1,11 @@
 #include "worker/light/emission_table.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "tests/support/scene_builder.h"
 #include "tests/support/statistics.h"
@@ -278,6 +280,93 @@ TEST(EmissionTable, ATriangleThatGlowsAboutEvenlyHasNone) {
     const Lit lit(builder.Build());
     EXPECT_EQ(lit.lights->TableOf(lit.lights->emissive()[0]) == nullptr, dark == 220);
   }
+}
+
+// A facade of 4 x 4 m whose texture has one lit square of `lit` texels, of `side` x `side`, and their flux over pi.
+float FluxOf(int side, int lit) {
+  Texture texture = Dark(side, true);
+  const int x0 = side / 3, y0 = side / 5;
+  for (int y = y0; y < y0 + lit; ++y) {
+    for (int x = x0; x < x0 + lit; ++x) std::fill_n(TexelOf(texture, x, y), 3, uint8_t{255});
+  }
+  SceneBuilder builder;
+  Material material;
+  material.emission = {1000, 1000, 1000};
+  material.emission_texture.texture = builder.AddTexture(texture);
+  builder.AddQuad({0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {.material = builder.AddMaterial(material), .lightmapped = false});
+  const Lit facade(builder.Build());
+  float flux = 0;
+  for (const EmissiveTriangle& light : facade.lights->emissive()) flux += light.area * light.mean_radiance.x;
+  return flux;
+}
+
+// Symptom: of a texture of 4,096 x 4,096 what was smaller than 12 x 12 texels fell between the points, and its triangle
+// was no light.
+TEST(EmissionTable, LargeTexturesLoseNothingBetweenThePoints) {
+  const float texel = 16.0f / (4096 * 4096);
+  EXPECT_NEAR(FluxOf(4096, 8) / (1000 * 64 * texel), 1, 0.05);
+  EXPECT_NEAR(FluxOf(4096, 3) / (1000 * 9 * texel), 1, 0.5);
+  EXPECT_GT(FluxOf(4096, 1), 0);
+}
+
+// The windows of a tower, `count` quads with the same texture coordinates, and one with others.
+Scene Tower(int count) {
+  Texture texture = Dark(64, false);
+  for (int x = 10; x < 14; ++x) std::fill_n(TexelOf(texture, x, 30), 3, uint8_t{255});
+  SceneBuilder builder;
+  Material material;
+  material.emission = {100, 100, 100};
+  material.emission_texture.texture = builder.AddTexture(texture);
+  material.double_sided = true;
+  const int lamp = builder.AddMaterial(material);
+  for (int i = 0; i < count; ++i) {
+    builder.AddQuad({0, 0, 3.0 * i}, {2, 0, 0}, {0, 2, 0}, {.material = lamp, .lightmapped = false});
+  }
+  material.emission_texture.scale = {2, 2};
+  builder.AddQuad({0, 0, -3}, {2, 0, 0}, {0, 2, 0}, {.material = builder.AddMaterial(material), .lightmapped = false});
+  return builder.Build();
+}
+
+// Symptom: a thousand lamps took 2.5 s, and 37,000 had no tables.
+TEST(EmissionPatterns, LampsThatGlowAlikeShareATable) {
+  const Lit lit(Tower(20000));
+  std::set<const EmissionTable*> tables, of_tower;
+  for (const EmissiveTriangle& light : lit.lights->emissive()) {
+    tables.insert(lit.lights->TableOf(light));
+    if (lit.world->triangles()[light.triangle].object < 20000) of_tower.insert(lit.lights->TableOf(light));
+  }
+  EXPECT_EQ(lit.lights->local_count(), 20000 + 2);  // of each quad of the tower one triangle is dark
+  EXPECT_EQ(tables.count(nullptr), 0);
+  EXPECT_EQ(of_tower.size(), 1);
+  EXPECT_EQ(tables.size(), 3);
+}
+
+TEST(EmissionPatterns, TrianglesThatCoincideAreTheirOwn) {
+  Scene scene = Tower(3);
+  scene.objects[1].position = scene.objects[0].position;  // both sides of each glow: the second is never met
+  const Lit lit(std::move(scene));
+  std::set<uint32_t> objects;
+  for (const EmissiveTriangle& light : lit.lights->emissive()) {
+    objects.insert(lit.world->triangles()[light.triangle].object);
+  }
+  EXPECT_EQ(objects, (std::set<uint32_t>{0, 2, 3}));
+}
+
+TEST(EmissionPatterns, TheSameForAnyNumberOfThreads) {
+  const auto all = [](size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const Lit lit(Textured(7));
+    std::vector<float> numbers;
+    for (const EmissiveTriangle& light : lit.lights->emissive()) {
+      numbers.insert(numbers.end(), {static_cast<float>(light.table), light.mean_radiance.x, light.mean_radiance.z});
+      if (const EmissionTable* table = lit.lights->TableOf(light)) {
+        numbers.push_back(table->most_over_pdf());
+        numbers.push_back(table->Pdf({0.25f, 0.5f}));
+      }
+    }
+    return numbers;
+  };
+  EXPECT_EQ(all(1), all(8));
 }
 
 TEST(EmissionTable, VeryManyHaveLess) {

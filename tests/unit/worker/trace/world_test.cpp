@@ -171,7 +171,7 @@ TEST(World, VisitsWhatIsNearUntilToldToStop) {
   }
 }
 
-TEST(AlphaRange, HoldsEverySampleOfTheTriangle) {
+TEST(RangeOver, HoldsEverySampleOfTheTriangle) {
   TestRandom random(9);
   int narrow = 0;
   for (int i = 0; i < 300; ++i) {
@@ -184,15 +184,18 @@ TEST(AlphaRange, HoldsEverySampleOfTheTriangle) {
     ref.rotation_rad = random.Between(0, 6);
     std::array<Vec2f, 3> corners;
     for (Vec2f& corner : corners) corner = {random.Between(-3, 3) * size, random.Between(-3, 3) * size};
-    const auto [least, most] = AlphaRange(texture, ref, corners);
-    narrow += least > 0.02f || most < 0.98f ? 1 : 0;
+    const TexelRange range = RangeOver(texture, ref, corners, 65536);
+    narrow += range.least_alpha > 0.02f || range.most_alpha < 0.98f ? 1 : 0;
     for (int k = 0; k < 100; ++k) {
       Vec2f b = random.Square();
       if (b.x + b.y > 1) b = {1 - b.x, 1 - b.y};
       const Vec2f uv = corners[0] * (1 - b.x - b.y) + corners[1] * b.x + corners[2] * b.y;
       const float alpha = SampleAlpha(texture, ref, uv);
-      EXPECT_GE(alpha, least - 1e-5f);
-      EXPECT_LE(alpha, most + 1e-5f);
+      EXPECT_GE(alpha, range.least_alpha - 1e-5f);
+      EXPECT_LE(alpha, range.most_alpha + 1e-5f);
+      const Rgb color = SampleColor(texture, ref, uv);
+      EXPECT_GE(color.y, range.least.y - 1e-5f);
+      EXPECT_LE(color.y, range.most.y + 1e-5f);
     }
   }
   EXPECT_GT(narrow, 30) << "ranges that say something";
