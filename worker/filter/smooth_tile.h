@@ -17,7 +17,7 @@ class SmoothTile {
   // The same tile, connected, for another signal; before the first Put.
   SmoothTile(const SmoothTile& connected, Signal signal);
 
-  // Connects neighbours. valid, crowded (IsCrowded): one flag a texel of the tile. Returns ConnectTexel's bits, one
+  // Connects neighbours. valid, crowded (Surroundings): one flag a texel of the tile. Returns ConnectTexel's bits, one
   // element a texel.
   std::vector<uint8_t> Connect(const World& world, const std::vector<bool>& valid, const std::vector<bool>& crowded,
                                int64_t& rays);

@@ -54,7 +54,7 @@ class TileGatherer {
       const Texel& texel = map_.texels[i];
       Work work(TexelSampler(scene_.world, layout, map_, texel));
       work.key = TexelKey(texel, options_.seed);
-      work.crowded = IsCrowded(scene_.world, layout, texel, work.sampler.radius());
+      work.around = LookAround(scene_.world, layout, texel, work.sampler.radius(), map_.footprint);
       work_.push_back(std::move(work));
     }
     if (lit_ ? Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) LeaveOutDark();
@@ -96,7 +96,7 @@ class TileGatherer {
   // samples nor neighbours that could tell what it missed.
   uint32_t FirstSamples(const Work& work) const {
     const bool divided = work.sampler.valid_mask() != 0xffff;
-    const int least = divided ? kDividedSamples : work.crowded ? kBlocks : options_.min_samples;
+    const int least = divided ? kDividedSamples : work.around.crowded ? kBlocks : options_.min_samples;
     return static_cast<uint32_t>(std::clamp(least, options_.min_samples, options_.max_samples));
   }
 
@@ -201,8 +201,8 @@ class TileGatherer {
     if (work.indirect.count() > 0)
       backs = {work.backs / work.indirect.count(), work.nearest_back, work.indirect_samples};
     const TexelValidity validity =
-        ProbeValidity(scene_.world, work.key, backs, Skips(Skip::kInvalidTexels) ? PartSearch::kNear : PartSearch::kAll,
-                      work.crowded, work.sampler);
+        ProbeValidity(scene_.world, texel, backs, Skips(Skip::kInvalidTexels) ? PartSearch::kNear : PartSearch::kAll,
+                      work.around, work.sampler);
     counters_.validity_rays += validity.rays;
     counters_.skip[Skip::kInvalidTexels].Add({validity.rays_saved > 0 ? 1 : 0, 1, validity.rays_saved});
     work.valid = validity.valid;
@@ -288,7 +288,7 @@ class TileGatherer {
   void Connect() {
     std::vector<bool> valid, crowded;
     for (const Work& work : work_) valid.push_back(work.valid);
-    for (const Work& work : work_) crowded.push_back(work.crowded);
+    for (const Work& work : work_) crowded.push_back(work.around.crowded);
     SmoothTile tile(map_, begin_, end_);
     const std::vector<uint8_t> open = tile.Connect(scene_.world, valid, crowded, counters_.filter_rays);
     for (size_t i = 0; i < work_.size(); ++i) work_[i].open = open[i];

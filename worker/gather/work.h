@@ -10,6 +10,7 @@
 #include "worker/gather/direct.h"
 #include "worker/gather/guide.h"
 #include "worker/gather/tile.h"
+#include "worker/texel/validity.h"
 
 namespace bakewell {
 
@@ -22,7 +23,7 @@ struct TexelWork {
   float expected = 0;  // ExpectedIrradiance
   uint32_t key = 0;
   bool valid = true;
-  bool crowded = true;                 // IsCrowded
+  Surroundings around;
   bool dark = false, audited = false;  // to be left out; but computed all the same
   uint8_t open = 0;
   float direct_correction = 1, indirect_correction = 1;  // of the accumulators' variances

@@ -1,5 +1,7 @@
 #include "worker/texel/validity.h"
 
+#include <absl/container/inlined_vector.h>
+
 #include <algorithm>
 #include <limits>
 
@@ -114,12 +116,54 @@ TexelValidity ProbeWhole(const World& world, TexelSampler& sampler, const SobolS
   return Saving((kPlaces - 1) * kPlaceRays, result);
 }
 
+// The texel's plane: heights above it, and places on it about the texel's centre.
+struct Plane {
+  Vec3f origin;
+  Frame frame;
+  Vec3d Of(Vec3f p) const {
+    const Vec3d d = ToDouble(p) - ToDouble(origin);
+    return {Dot(d, ToDouble(frame.t)), Dot(d, ToDouble(frame.b)), Dot(d, ToDouble(frame.n))};
+  }
+};
+
+// The part of a polygon where sign * (height - limit) >= 0.
+absl::InlinedVector<Vec3d, 8> ClipHeight(const absl::InlinedVector<Vec3d, 8>& polygon, double limit, double sign) {
+  absl::InlinedVector<Vec3d, 8> part;
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const Vec3d a = polygon[i], b = polygon[(i + 1) % polygon.size()];
+    const double da = sign * (a.z - limit), db = sign * (b.z - limit);
+    if (da >= 0) part.push_back(a);
+    if ((da > 0 && db < 0) || (da < 0 && db > 0)) part.push_back(a + (b - a) * (da / (da - db)));
+  }
+  return part;
+}
+
+// Whether a triangle comes within `radius` of the centre, seen along the normal, at heights in [low, high].
+bool StandsWithin(const Plane& plane, const Triangle& t, double low, double high, double radius) {
+  absl::InlinedVector<Vec3d, 8> part{plane.Of(t.p0), plane.Of(t.p0 + t.e1), plane.Of(t.p0 + t.e2)};
+  part = ClipHeight(ClipHeight(part, low, 1), high, -1);
+  int left = 0, right = 0;  // of the edges, the centre
+  for (size_t i = 0; i < part.size(); ++i) {
+    Vec3d a = part[i], along = part[(i + 1) % part.size()] - a;
+    a.z = along.z = 0;
+    const double length2 = Dot(along, along);
+    const Vec3d nearest = a + along * (length2 > 0 ? std::clamp(-Dot(a, along) / length2, 0.0, 1.0) : 0.0);
+    if (Dot(nearest, nearest) <= radius * radius) return true;
+    const double side = Cross(a, along).z;
+    left += side > 0 ? 1 : 0;
+    right += side < 0 ? 1 : 0;
+  }
+  return left + right > 0 && (left == 0 || right == 0);
+}
+
 }  // namespace
 
-bool IsCrowded(const World& world, const AtlasLayout& layout, const Texel& texel, float radius) {
+Surroundings LookAround(const World& world, const AtlasLayout& layout, const Texel& texel, float radius,
+                        float footprint) {
   constexpr float kAboutFlat = 0.9f;  // cosine
   constexpr int kMostVisited = 64;
-  bool crowded = false;
+  const Plane plane{texel.position, FrameFromNormal(texel.normal)};
+  Surroundings around{false, false};
   int visited = 0;
   world.VisitNear(texel.position, 2 * radius, [&](uint32_t triangle) {
     const Triangle& t = world.triangles()[triangle];
@@ -127,38 +171,44 @@ bool IsCrowded(const World& world, const AtlasLayout& layout, const Texel& texel
     const bool own = !charts.empty() && charts[t.index_in_object] == texel.chart;
     const auto height = [&](Vec3f p) { return Dot(p - texel.position, texel.normal); };
     const float rise = std::max({height(t.p0), height(t.p0 + t.e1), height(t.p0 + t.e2)});
-    const bool rises = rise > 4 * world.PointAt(triangle, 0, 0, false).offset;
-    crowded = (rises && !(own && Dot(t.normal, texel.normal) >= kAboutFlat)) || ++visited > kMostVisited;
-    return !crowded;
+    const float rounding = 4 * world.PointAt(triangle, 0, 0, false).offset;
+    if (rise > rounding && !(own && Dot(t.normal, texel.normal) >= kAboutFlat)) {
+      around.crowded = true;
+      around.divided =
+          !own && !world.MaterialOf(t).double_sided && StandsWithin(plane, t, -rounding, radius, footprint * radius);
+    }
+    if (++visited > kMostVisited) around = {true, true};
+    return !around.divided;
   });
-  return crowded;
+  return around;
 }
 
 bool MeetsBack(const World& world, const Hit& hit) {
   return hit && hit.back && !world.MaterialOf(world.triangles()[hit.triangle]).double_sided;
 }
 
-TexelValidity ProbeValidity(const World& world, uint32_t key, const std::optional<BacksSeen>& seen, PartSearch search,
-                            bool crowded, TexelSampler& sampler) {
+TexelValidity ProbeValidity(const World& world, const Texel& texel, const std::optional<BacksSeen>& seen,
+                            PartSearch search, Surroundings around, TexelSampler& sampler) {
   TexelValidity result;
   if (world.backfaces() == BackfaceMode::kPass) return result;
-  const SobolSet set(HashCombine(key, 0x7a11du));
+  const SobolSet set(
+      HashCombine(HashCombine(static_cast<uint32_t>(texel.x), static_cast<uint32_t>(texel.y)), 0x7a11du));
   const TexelPoint center = sampler.At({0.5f, 0.5f});
   result.backface_share = seen ? seen->share
                                : BackShare(world, center.surface, center.frame, set,
-                                           crowded ? kValidityFirstRays : kLeastValidityRays, result.rays);
-  if (search == PartSearch::kNear) {
+                                           around.crowded ? kValidityFirstRays : kLeastValidityRays, result.rays);
+  if (search == PartSearch::kNear && !around.divided) {
     if (result.backface_share == 0) return Saving(kCrowdRays, result);
     const bool outside = seen && result.backface_share <= kOutsideShare && seen->nearest > 2 * sampler.radius();
     const bool inside = result.backface_share > kInsideShare;
-    if (!crowded) {
+    if (!around.crowded) {
       if (outside && seen->rays >= kValidityFirstRays) return Saving(kPlaces * kPlaceRays, result);
       return ProbeWhole(world, sampler, set, result);
     }
     if ((outside || inside) && !Crowded(world, center, sampler.radius(), result.rays)) {
       return outside ? Saving(kPlaces * kPlaceRays, result) : ProbeWhole(world, sampler, set, result);
     }
-  } else if (result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) {
+  } else if (!around.divided && result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) {
     return result;
   }
   const uint16_t mask = ProbeMask(world, sampler, set, result);

@@ -9,10 +9,19 @@ namespace bakewell {
 
 inline constexpr int kLeastValidityRays = 4;  // of a texel that nothing divides, where nobody knows yet
 
-// Whether anything but the about flat surface of the texel's own chart rises above its plane within two radii of its
-// centre (or so many triangles are there that it is not worth knowing). Where nothing does, nothing divides the texel
-// or stands between it and a neighbour.
-bool IsCrowded(const World& world, const AtlasLayout& layout, const Texel& texel, float radius);
+// What else is near a texel.
+struct Surroundings {
+  // Anything but the about flat surface of the texel's own chart rises above its plane within two radii of its centre
+  // (or so many triangles are there that it is not worth knowing). Where nothing does, nothing divides the texel or
+  // stands between it and a neighbour.
+  bool crowded = true;
+  // Something with a back, of another chart or of none, stands on or hangs a radius or less above what the texel
+  // averages: a part of it may lie inside.
+  bool divided = true;
+};
+// radius: TexelSampler::radius().
+Surroundings LookAround(const World& world, const AtlasLayout& layout, const Texel& texel, float radius,
+                        float footprint);
 
 // What rays from a texel say about where it lies.
 struct TexelValidity {
@@ -35,12 +44,14 @@ struct BacksSeen {
 // back face within its own diagonal, if that helps. Texels whose first rays meet no back face, and that have nothing
 // standing within their own reach, cost no more than those rays. `seen`: without it eight rays find out. With
 // BackfaceMode::kPass nothing has a back. Search::kNear trusts those rays where they start all over the texel: it looks
-// for parts only where some met a back face, and not where nothing stands within the texel's reach and either nearly
-// all of them did, and what holds for the centre holds for all of it, or few did and none near by, as a plate that
-// hangs over part of the texel would be; nor in a texel that is not `crowded`.
+// for parts of a texel that is not divided only where some met a back face, and not where nothing stands within its
+// reach and either nearly all of them did, and what holds for the centre holds for all of it, or few did and none near
+// by; nor in a texel that is not crowded.
+//
+// Only `seen` depends on the seed: rays of the probe's own go by the texel's place.
 enum class PartSearch : uint8_t { kAll, kNear };
-TexelValidity ProbeValidity(const World& world, uint32_t key, const std::optional<BacksSeen>& seen, PartSearch search,
-                            bool crowded, TexelSampler& sampler);
+TexelValidity ProbeValidity(const World& world, const Texel& texel, const std::optional<BacksSeen>& seen,
+                            PartSearch search, Surroundings around, TexelSampler& sampler);
 
 // Whether a ray's first hit is the back of a single-sided surface.
 bool MeetsBack(const World& world, const Hit& hit);
