@@ -113,7 +113,7 @@ TexelValidity ProbeWhole(const World& world, TexelSampler& sampler, const SobolS
     result.pushed_out = PushOut(world, sampler, set, result);
     result.valid = result.pushed_out;
   }
-  return Saving((kPlaces - 1) * kPlaceRays, result);
+  return result;
 }
 
 // The texel's plane: heights above it, and places on it about the texel's centre.
@@ -197,17 +197,20 @@ TexelValidity ProbeValidity(const World& world, const Texel& texel, const std::o
   result.backface_share = seen ? seen->share
                                : BackShare(world, center.surface, center.frame, set,
                                            around.crowded ? kValidityFirstRays : kLeastValidityRays, result.rays);
+  const auto whole = [&] { return ProbeWhole(world, sampler, set, result); };
   if (search == PartSearch::kNear && !around.divided) {
-    if (result.backface_share == 0) return Saving(kCrowdRays, result);
+    constexpr int kParts = kPlaces * kPlaceRays, kOtherParts = kParts - kPlaceRays;  // rays, at least
+    if (result.backface_share == 0) return Saving(around.crowded ? kCrowdRays : 0, result);
     const bool outside = seen && result.backface_share <= kOutsideShare && seen->nearest > 2 * sampler.radius();
     const bool inside = result.backface_share > kInsideShare;
     if (!around.crowded) {
-      if (outside && seen->rays >= kValidityFirstRays) return Saving(kPlaces * kPlaceRays, result);
-      return ProbeWhole(world, sampler, set, result);
+      return outside && seen->rays >= kValidityFirstRays ? Saving(kInsideRays, result) : whole();
     }
     if ((outside || inside) && !Crowded(world, center, sampler.radius(), result.rays)) {
-      return outside ? Saving(kPlaces * kPlaceRays, result) : ProbeWhole(world, sampler, set, result);
+      return outside ? Saving(kParts, result) : Saving(kOtherParts, whole());
     }
+  } else if (!around.crowded) {
+    return result.backface_share == 0 ? result : whole();
   } else if (!around.divided && result.backface_share == 0 && !Crowded(world, center, sampler.radius(), result.rays)) {
     return result;
   }

@@ -13,7 +13,7 @@ inline constexpr int kLeastValidityRays = 4;  // of a texel that nothing divides
 struct Surroundings {
   // Anything but the about flat surface of the texel's own chart rises above its plane within two radii of its centre
   // (or so many triangles are there that it is not worth knowing). Where nothing does, nothing divides the texel or
-  // stands between it and a neighbour.
+  // stands between it and a neighbour: it is inside or outside as its centre is.
   bool crowded = true;
   // Something with a back, of another chart or of none, stands on or hangs a radius or less above what the texel
   // averages: a part of it may lie inside.
