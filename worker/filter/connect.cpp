@@ -1,5 +1,8 @@
 #include "worker/filter/connect.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "worker/filter/window.h"
 
 namespace bakewell {
@@ -7,6 +10,22 @@ namespace {
 
 constexpr float kLift = 0.05f;       // height of the rays between neighbours, over their length
 constexpr float kSameFacing = 0.9f;  // least cosine between the normals of neighbours
+// Of neighbours one of which has so many times less room above it one lies in a gap and the other outside, in other
+// light. What is more than kMostRoom texels away makes no gap; so the other of the two is crowded as well. No whole
+// ratio: levels are built on the grid that texels lie on, and rounding would decide.
+constexpr float kSameRoom = 2.1f, kMostRoom = 2;
+
+// A little off the texel's centre, for the same reason: a ray along a wall meets it or does not.
+constexpr float kAside = 0.07f;
+
+// How far the surface is that a texel faces, in sides of a texel; `sides` is the way to a neighbour.
+float RoomAbove(const World& world, const Texel& texel, Vec3f to_neighbour, float sides, int64_t& rays) {
+  const float side = Length(to_neighbour) / sides, lift = kLift * side;
+  ++rays;
+  const Vec3f from = texel.position + to_neighbour * kAside + texel.normal * lift;
+  const Hit hit = world.Intersect({from, texel.normal, kMostRoom * side, 0});
+  return hit ? (hit.t + lift) / side : kMostRoom;
+}
 
 }  // namespace
 
@@ -28,6 +47,10 @@ uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, bo
     if (crowded && length > 0) {
       ++rays;
       if (world.Occluded({from, way / length, length, 0})) continue;
+      const float sides = std::hypot(static_cast<float>(kNeighbours[k][0]), static_cast<float>(kNeighbours[k][1]));
+      const float room_a = RoomAbove(world, a, b.position - a.position, sides, rays);
+      const float room_b = RoomAbove(world, b, a.position - b.position, sides, rays);
+      if (std::max(room_a, room_b) > kSameRoom * std::min(room_a, room_b)) continue;
     }
     open |= static_cast<uint8_t>(1U << k);
   }
