@@ -17,9 +17,9 @@ constexpr double kMostTexels = 65536;    // under a triangle, to know that it gl
 
 struct Pattern {
   uint32_t triangle = 0;  // the first of those that have it
-  Rgb mean{};
+  Rgb mean;
   bool known = false;  // it glows evenly or not at all, by its texels
-  std::optional<EmissionTable> table{};
+  std::optional<EmissionTable> table;
 };
 
 template <typename Compute>
@@ -62,7 +62,7 @@ EmissionPatterns::EmissionPatterns(const World& world) {
   for (uint32_t k = 0; k < world.triangles().size(); ++k) {
     if (!world.Emits(k)) continue;
     const auto [found, is_new] = number_of.try_emplace(world.GlowInputsOf(k), patterns.size());
-    if (is_new) patterns.push_back({.triangle = k});
+    if (is_new) patterns.emplace_back().triangle = k;
     pattern_of.push_back(found->second);
     emitters_.push_back({.triangle = k});
   }
