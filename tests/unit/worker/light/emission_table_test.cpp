@@ -26,12 +26,13 @@ uint8_t* TexelOf(Texture& texture, int x, int y) {
   return texture.rgba.data() + 4 * static_cast<ptrdiff_t>(y * texture.width + x);
 }
 
-// A facade of 2 x 2 m in the plane z = 0 that looks along +z, one square of whose 64 x 64 texels is lit.
-constexpr int kLitX = 13, kLitY = 21;
-Scene Facade(int lit_texels, bool nearest) {
-  Texture texture = Dark(kTexels, nearest);
-  for (int y = kLitY; y < kLitY + lit_texels; ++y) {
-    for (int x = kLitX; x < kLitX + lit_texels; ++x) std::fill_n(TexelOf(texture, x, y), 3, uint8_t{255});
+// A facade of 2 x 2 m in the plane z = 0 that looks along +z, one square of whose texels is lit.
+struct LitSquare {
+  int x, y, texels;
+};
+Scene FacadeWith(Texture texture, LitSquare lit) {
+  for (int y = lit.y; y < lit.y + lit.texels; ++y) {
+    for (int x = lit.x; x < lit.x + lit.texels; ++x) std::fill_n(TexelOf(texture, x, y), 3, uint8_t{255});
   }
   SceneBuilder builder;
   Material material;
@@ -39,6 +40,17 @@ Scene Facade(int lit_texels, bool nearest) {
   material.emission_texture.texture = builder.AddTexture(texture);
   builder.AddQuad({0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {.material = builder.AddMaterial(material), .lightmapped = false});
   return builder.Build();
+}
+
+constexpr int kLitX = 13, kLitY = 21;
+Scene Facade(int lit_texels, bool nearest) { return FacadeWith(Dark(kTexels, nearest), {kLitX, kLitY, lit_texels}); }
+
+// Over pi [W m^-2 sr^-1 m^2].
+float FluxOf(const Scene& scene) {
+  const Lit lit(scene);
+  float flux = 0;
+  for (const EmissiveTriangle& light : lit.lights->emissive()) flux += light.area * light.mean_radiance.x;
+  return flux;
 }
 
 // The same light from geometry.
@@ -100,10 +112,7 @@ Estimate EvenIrradiance(const Lit& lit, Vec3d at_ws, uint32_t seed, int n) {
 // Symptom: the one lit window of a facade fell between the 64 points that said how bright its triangles are, and all
 // its light was lost.
 TEST(EmissionTable, OneLitWindowOfAFacadeIsALight) {
-  const Lit lit(Facade(2, false));
-  float flux = 0;  // over pi [W m^-2 sr^-1 m^2]
-  for (const EmissiveTriangle& light : lit.lights->emissive()) flux += light.area * light.mean_radiance.x;
-  EXPECT_NEAR(flux, 1000 * 4 * 4.0f / (kTexels * kTexels), 1);
+  EXPECT_NEAR(FluxOf(Facade(2, false)), 1000 * 4 * 4.0f / (kTexels * kTexels), 1);
 }
 
 // Symptom: of the points on a facade one of 4,096 fell into its one lit texel, and a bake stopped before it saw light.
@@ -282,31 +291,14 @@ TEST(EmissionTable, ATriangleThatGlowsAboutEvenlyHasNone) {
   }
 }
 
-// A facade of 4 x 4 m whose texture has one lit square of `lit` texels, of `side` x `side`, and their flux over pi.
-float FluxOf(int side, int lit) {
-  Texture texture = Dark(side, true);
-  const int x0 = side / 3, y0 = side / 5;
-  for (int y = y0; y < y0 + lit; ++y) {
-    for (int x = x0; x < x0 + lit; ++x) std::fill_n(TexelOf(texture, x, y), 3, uint8_t{255});
-  }
-  SceneBuilder builder;
-  Material material;
-  material.emission = {1000, 1000, 1000};
-  material.emission_texture.texture = builder.AddTexture(texture);
-  builder.AddQuad({0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {.material = builder.AddMaterial(material), .lightmapped = false});
-  const Lit facade(builder.Build());
-  float flux = 0;
-  for (const EmissiveTriangle& light : facade.lights->emissive()) flux += light.area * light.mean_radiance.x;
-  return flux;
-}
-
 // Symptom: of a texture of 4,096 x 4,096 what was smaller than 12 x 12 texels fell between the points, and its triangle
 // was no light.
 TEST(EmissionTable, LargeTexturesLoseNothingBetweenThePoints) {
-  const float texel = 16.0f / (4096 * 4096);
-  EXPECT_NEAR(FluxOf(4096, 8) / (1000 * 64 * texel), 1, 0.05);
-  EXPECT_NEAR(FluxOf(4096, 3) / (1000 * 9 * texel), 1, 0.5);
-  EXPECT_GT(FluxOf(4096, 1), 0);
+  const auto flux_of = [](int lit) { return FluxOf(FacadeWith(Dark(4096, true), {1365, 819, lit})); };
+  const float of_texel = 1000 * 4.0f / (4096 * 4096);
+  EXPECT_NEAR(flux_of(8) / (64 * of_texel), 1, 0.05);
+  EXPECT_NEAR(flux_of(3) / (9 * of_texel), 1, 0.5);
+  EXPECT_GT(flux_of(1), 0);
 }
 
 // The windows of a tower, `count` quads with the same texture coordinates, and one with others.
