@@ -177,8 +177,8 @@ Surroundings LookAround(const World& world, const AtlasLayout& layout, const Tex
       around.divided =
           !own && !world.MaterialOf(t).double_sided && StandsWithin(plane, t, -rounding, radius, footprint * radius);
     }
-    if (++visited > kMostVisited) around = {true, true};
-    return !around.divided;
+    if (++visited > kMostVisited) around.crowded = true;
+    return !around.divided && visited <= kMostVisited;
   });
   return around;
 }

@@ -16,7 +16,7 @@ struct Surroundings {
   // stands between it and a neighbour: it is inside or outside as its centre is.
   bool crowded = true;
   // Something with a back, of another chart or of none, stands on or hangs a radius or less above what the texel
-  // averages: a part of it may lie inside.
+  // averages, as far as one looked: a part of it may lie inside.
   bool divided = true;
 };
 // radius: TexelSampler::radius().

@@ -197,6 +197,22 @@ TEST(LookAround, DividedWhereSomethingWithABackStandsOnTheTexel) {
   EXPECT_TRUE(divided(FloorWithBox(3.6, 3.7, 4.6, 4.7), 3, 4));  // all of it within the texel
 }
 
+// Symptom: every texel of a mesh finer than the lightmap was searched, with twice the rays of all the rest.
+TEST(LookAround, ManyTrianglesAloneDivideNothing) {
+  SceneBuilder builder({8, 8});
+  builder.AddQuad({0, 0, 0}, {8, 0, 0}, {0, 0, -8}, {.page = {0, 0, 8, 8}});
+  for (int i = 0; i < 100; ++i) {
+    builder.AddQuad({3 + 0.1 * (i % 10), -0.1, -4 - 0.1 * (i / 10)}, {0.1, 0, 0}, {0, 0, -0.1}, {.lightmapped = false});
+  }
+  const Scene scene = builder.Build();
+  const PreparedLevel prepared = PrepareInMemory(scene, {});
+  const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 3 + 3)]];
+  const TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
+  const Surroundings around = LookAround(*prepared.world, prepared.layout, texel, sampler.radius(), 1);
+  EXPECT_TRUE(around.crowded);
+  EXPECT_FALSE(around.divided);
+}
+
 TEST(ProbeValidity, NothingHasABackWhereBackfacesPass) {
   const Probed probed = Probe(FloorWithBox(1, 6, 1, 6), 3, 3, BackfaceMode::kPass);
   EXPECT_TRUE(probed.validity.valid);
