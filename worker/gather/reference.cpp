@@ -166,7 +166,7 @@ std::vector<ReferenceTexel> TraceReference(const World& world, const LightSet& l
     for (uint32_t i = map.tile_begin[tile]; i < map.tile_begin[tile + 1]; ++i) {
       TexelSampler sampler(world, layout, map, map.texels[i]);
       const uint32_t key = TexelKey(map.texels[i], HashCombine(seed, 0x4ef0u));
-      const Surroundings around = LookAround(world, layout, map.texels[i], sampler.radius(), map.footprint);
+      const Surroundings around = LookAround(world, layout, map.texels[i], sampler, map.footprint);
       result[i].valid = ProbeValidity(world, map.texels[i], std::nullopt, PartSearch::kAll, around, sampler).valid;
       if (!result[i].valid) continue;
       result[i] = TraceTexel(tracer, sampler, key, samples);

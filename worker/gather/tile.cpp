@@ -54,7 +54,7 @@ class TileGatherer {
       const Texel& texel = map_.texels[i];
       Work work(TexelSampler(scene_.world, layout, map_, texel));
       work.key = TexelKey(texel, options_.seed);
-      work.around = LookAround(scene_.world, layout, texel, work.sampler.radius(), map_.footprint);
+      work.around = LookAround(scene_.world, layout, texel, work.sampler, map_.footprint);
       work_.push_back(std::move(work));
     }
     if (lit_ ? Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) LeaveOutDark();

@@ -1,6 +1,7 @@
 #include "worker/texel/sampler.h"
 
 #include <cmath>
+#include <limits>
 
 #include "core/base/check.h"
 #include "worker/sample/warp.h"
@@ -163,6 +164,16 @@ TexelPoint TexelSampler::PointAt(Place place) const {
     point.valid = valid_mask_ >> MaskBit(place) & 1;
   }
   return point;
+}
+
+float TexelSampler::LeastHeight(Vec3f origin, Vec3f normal) const {
+  float least = std::numeric_limits<float>::infinity();
+  for (const Part& part : parts_) {
+    const float height = Dot(part.p0 - origin, normal), rise1 = Dot(part.e1, normal), rise2 = Dot(part.e2, normal);
+    least = std::min({least, height, height + rise1, height + rise2});
+    if (part.whole) least = std::min(least, height + rise1 + rise2);
+  }
+  return least;
 }
 
 }  // namespace bakewell

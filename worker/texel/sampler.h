@@ -35,6 +35,8 @@ class TexelSampler {
   void set_valid_mask(uint16_t mask) { valid_mask_ = mask; }
   // All points move to this place (a texel pushed out of a solid).
   void MoveTo(Vec3f position);
+  // Least height of what is drawn from over a plane with unit normal `normal` through `origin` [m].
+  float LeastHeight(Vec3f origin, Vec3f normal) const;
   // Half the diagonal of the texel on the surface [m].
   float radius() const { return radius_; }
 

@@ -158,11 +158,12 @@ bool StandsWithin(const Plane& plane, const Triangle& t, double low, double high
 
 }  // namespace
 
-Surroundings LookAround(const World& world, const AtlasLayout& layout, const Texel& texel, float radius,
+Surroundings LookAround(const World& world, const AtlasLayout& layout, const Texel& texel, const TexelSampler& sampler,
                         float footprint) {
   constexpr float kAboutFlat = 0.9f;  // cosine
   constexpr int kMostVisited = 64;
   const Plane plane{texel.position, FrameFromNormal(texel.normal)};
+  const float radius = sampler.radius();
   Surroundings around{false, false};
   int visited = 0;
   world.VisitNear(texel.position, 2 * radius, [&](uint32_t triangle) {
@@ -174,8 +175,8 @@ Surroundings LookAround(const World& world, const AtlasLayout& layout, const Tex
     const float rounding = 4 * world.PointAt(triangle, 0, 0, false).offset;
     if (rise > rounding && !(own && Dot(t.normal, texel.normal) >= kAboutFlat)) {
       around.crowded = true;
-      around.divided =
-          !own && !world.MaterialOf(t).double_sided && StandsWithin(plane, t, -rounding, radius, footprint * radius);
+      around.divided = !own && !world.MaterialOf(t).double_sided && sampler.LeastHeight(t.p0, t.normal) < -rounding &&
+                       StandsWithin(plane, t, -rounding, radius, footprint * radius);
     }
     if (++visited > kMostVisited) around.crowded = true;
     return !around.divided && visited <= kMostVisited;

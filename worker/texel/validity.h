@@ -16,11 +16,11 @@ struct Surroundings {
   // stands between it and a neighbour: it is inside or outside as its centre is.
   bool crowded = true;
   // Something with a back, of another chart or of none, stands on or hangs a radius or less above what the texel
-  // averages, as far as one looked: a part of it may lie inside.
+  // averages, some of which is behind it, as far as one looked: a part of the texel may lie inside.
   bool divided = true;
 };
-// radius: TexelSampler::radius().
-Surroundings LookAround(const World& world, const AtlasLayout& layout, const Texel& texel, float radius,
+// footprint: TexelMap::footprint.
+Surroundings LookAround(const World& world, const AtlasLayout& layout, const Texel& texel, const TexelSampler& sampler,
                         float footprint);
 
 // What rays from a texel say about where it lies.

@@ -43,7 +43,7 @@ TEST(LookAround, CrowdedWhereSomethingElseRisesWithinTwoRadii) {
   for (int x = 0; x < 8; ++x) {
     const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 3 + x)]];
     const TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-    EXPECT_EQ(LookAround(*prepared.world, prepared.layout, texel, sampler.radius(), 1).crowded, x >= 4 && x <= 6) << x;
+    EXPECT_EQ(LookAround(*prepared.world, prepared.layout, texel, sampler, 1).crowded, x >= 4 && x <= 6) << x;
   }
 }
 
@@ -55,7 +55,7 @@ TEST(LookAround, TexelsThatAreNotCrowdedHaveTheConnectionsThatRaysFind) {
     int64_t asked = 0, all = 0;
     for (uint32_t i = 0; i < map.texels.size(); ++i) {
       const TexelSampler sampler(*prepared.world, prepared.layout, map, map.texels[i]);
-      const bool crowded = LookAround(*prepared.world, prepared.layout, map.texels[i], sampler.radius(), 1).crowded;
+      const bool crowded = LookAround(*prepared.world, prepared.layout, map.texels[i], sampler, 1).crowded;
       EXPECT_EQ(ConnectTexel(*prepared.world, map, i, crowded, asked), ConnectTexel(*prepared.world, map, i, true, all))
           << i;
     }
@@ -105,8 +105,8 @@ TEST(ProbeValidity, NearSearchFindsTheSameWithFewerRays) {
     const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(24 + x)]];
     TexelSampler all(*prepared.world, prepared.layout, prepared.texels, texel), near = all;
     const BacksSeen seen{share, 0.5f};
-    const Surroundings around = LookAround(*prepared.world, prepared.layout, texel, all.radius(), 1);
-    EXPECT_EQ(around.divided, x != 3) << x;  // a side of the box within its circle
+    const Surroundings around = LookAround(*prepared.world, prepared.layout, texel, all, 1);
+    EXPECT_EQ(around.divided, x == 1) << x;
     const TexelValidity a = ProbeValidity(*prepared.world, texel, seen, PartSearch::kAll, around, all);
     const TexelValidity b = ProbeValidity(*prepared.world, texel, seen, PartSearch::kNear, around, near);
     EXPECT_EQ(a.valid, b.valid) << x;
@@ -160,7 +160,7 @@ TEST(ProbeValidity, ADividedTexelIsSearchedWhateverItsFirstRaysMet) {
   const PreparedLevel prepared = PrepareInMemory(FloorWithBox(1.7, 6, 3.7, 6), settings);  // a corner in texel (1, 3)
   const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 3 + 1)]];
   TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-  const Surroundings around = LookAround(*prepared.world, prepared.layout, texel, sampler.radius(), 1);
+  const Surroundings around = LookAround(*prepared.world, prepared.layout, texel, sampler, 1);
   EXPECT_TRUE(around.divided);
   const TexelValidity validity =
       ProbeValidity(*prepared.world, texel, BacksSeen{0, 0}, PartSearch::kNear, around, sampler);
@@ -176,7 +176,7 @@ TEST(LookAround, DividedWhereSomethingWithABackStandsOnTheTexel) {
     const PreparedLevel prepared = PrepareInMemory(scene, settings);
     const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * y + x)]];
     const TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-    return LookAround(*prepared.world, prepared.layout, texel, sampler.radius(), 1).divided;
+    return LookAround(*prepared.world, prepared.layout, texel, sampler, 1).divided;
   };
   const auto floor = [](double height, bool double_sided) {
     SceneBuilder builder({8, 8});
@@ -194,6 +194,7 @@ TEST(LookAround, DividedWhereSomethingWithABackStandsOnTheTexel) {
   EXPECT_FALSE(divided(floor(-1.1, false), 3, 3));
   EXPECT_FALSE(divided(floor(0, false), 1, 3));
   EXPECT_FALSE(divided(floor(0, true), 3, 3));
+  EXPECT_FALSE(divided(FloorWithBox(4, 6, 0, 8), 3, 3));  // its side stands on the texel's border
   EXPECT_TRUE(divided(FloorWithBox(3.6, 3.7, 4.6, 4.7), 3, 4));  // all of it within the texel
 }
 
@@ -208,7 +209,7 @@ TEST(LookAround, ManyTrianglesAloneDivideNothing) {
   const PreparedLevel prepared = PrepareInMemory(scene, {});
   const Texel& texel = prepared.texels.texels[prepared.texels.texel_at[0][static_cast<size_t>(8 * 3 + 3)]];
   const TexelSampler sampler(*prepared.world, prepared.layout, prepared.texels, texel);
-  const Surroundings around = LookAround(*prepared.world, prepared.layout, texel, sampler.radius(), 1);
+  const Surroundings around = LookAround(*prepared.world, prepared.layout, texel, sampler, 1);
   EXPECT_TRUE(around.crowded);
   EXPECT_FALSE(around.divided);
 }
