@@ -21,20 +21,10 @@ constexpr float kStraysByNoise = 4, kStraysMost = 8;  // standard errors; from t
 constexpr float kNoiseStray = 2, kAdmittedStray = 3;  // likewise, of a texel's neighbours and its own: it is a stray
 constexpr size_t kLeastVotes = 4;                     // neighbours that say whether it is
 
-// Of `count` values, the upper of two: by all ranks at once, without a branch.
 float MedianOf(std::array<float, kNeighbours.size()> values, size_t count) {
-  for (size_t i = count; i < values.size(); ++i) values[i] = std::numeric_limits<float>::infinity();
-  std::array<uint32_t, kNeighbours.size()> rank{};
-  for (uint32_t j = 0; j < values.size(); ++j) {
-    for (uint32_t i = 0; i < values.size(); ++i) {
-      const bool before = (values[j] < values[i]) | ((values[j] == values[i]) & (j < i));
-      rank[i] += before ? 1 : 0;
-    }
-  }
-  for (size_t i = 0; i < count; ++i) {
-    if (rank[i] == count / 2) return values[i];
-  }
-  return values[0];  // some are no numbers
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
+  return *middle;
 }
 
 // One texel of a ring around a window: its offset, and which of kNeighbours lies towards the centre.

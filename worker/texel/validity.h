@@ -40,13 +40,13 @@ struct BacksSeen {
 };
 
 // Finds the parts of a texel that lie inside other geometry (more than half of their hemisphere meets the back of a
-// single-sided surface first) and rules them out in the sampler's mask; a texel that is wholly inside is moved past a
-// back face within its own diagonal, if that helps. Texels whose first rays meet no back face, and that have nothing
-// standing within their own reach, cost no more than those rays. `seen`: without it eight rays find out. With
-// BackfaceMode::kPass nothing has a back. Search::kNear trusts those rays where they start all over the texel: it looks
-// for parts of a texel that is not divided only where some met a back face, and not where nothing stands within its
-// reach and either nearly all of them did, and what holds for the centre holds for all of it, or few did and none near
-// by; nor in a texel that is not crowded.
+// single-sided surface first) and rules them out in the sampler's mask; one that is not crowded is inside or outside as
+// its centre is. A texel that is wholly inside is moved past a back face within its own diagonal, if that helps. Texels
+// whose first rays meet no back face, and that have nothing standing within their own reach, cost no more than those
+// rays. `seen`: without it eight rays find out. With BackfaceMode::kPass nothing has a back. Search::kNear trusts those
+// rays where they start all over the texel: it looks for parts of a texel that is not divided only where some met a
+// back face, and not where nothing stands within its reach and either nearly all of them did, and what holds for the
+// centre holds for all of it, or few did and none near by.
 //
 // Only `seen` depends on the seed: rays of the probe's own go by the texel's place.
 enum class PartSearch : uint8_t { kAll, kNear };

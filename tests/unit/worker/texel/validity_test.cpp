@@ -194,7 +194,7 @@ TEST(LookAround, DividedWhereSomethingWithABackStandsOnTheTexel) {
   EXPECT_FALSE(divided(floor(-1.1, false), 3, 3));
   EXPECT_FALSE(divided(floor(0, false), 1, 3));
   EXPECT_FALSE(divided(floor(0, true), 3, 3));
-  EXPECT_FALSE(divided(FloorWithBox(4, 6, 0, 8), 3, 3));  // its side stands on the texel's border
+  EXPECT_FALSE(divided(FloorWithBox(4, 6, 0, 8), 3, 3));         // its side stands on the texel's border
   EXPECT_TRUE(divided(FloorWithBox(3.6, 3.7, 4.6, 4.7), 3, 4));  // all of it within the texel
 }
 
