@@ -1,6 +1,7 @@
 #include "worker/gather/direct.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "worker/sample/mis.h"
@@ -11,7 +12,6 @@ namespace bakewell {
 namespace {
 
 constexpr uint32_t kProbesPerNode = 8;
-constexpr size_t kMostNodes = 256;
 constexpr float kUnseenShare = 0.05f;  // a light that no probe saw keeps this share of its importance
 
 // A sphere around the texels' centres.
@@ -32,17 +32,29 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
   const int all = scene.lights.local_count();
   if (!scene.lights.emissive().empty()) cut_of_light_.assign(static_cast<size_t>(all), -1);
   const LightTree::Place place = Around(texels);
-  const std::vector<int> cut = scene.tree.Cut(place, kMostNodes), kept = scene.tree.Cull(cut, place, dispensable);
+  const std::vector<int> cut = scene.tree.Cut(place, LightPack::kMost);
+  const std::vector<int> kept = scene.tree.Cull(cut, place, dispensable);
   SkipCount& culled = counters.skip[Skip::kCulledLights];
-  culled.of += all;
-  culled.skipped += all;
-  for (const int node : kept) culled.skipped -= std::ssize(scene.tree.LightsOf(node));
-  for (const int node : kept) {
-    for (const int light : scene.tree.LightsOf(node)) {
-      if (!cut_of_light_.empty()) cut_of_light_[static_cast<size_t>(light)] = static_cast<int>(cut_.size());
+  std::vector<LightShape> shapes;
+  for (size_t i = 0, k = 0; i < cut.size(); ++i) {
+    const int node = cut[i];
+    const bool keep = k < kept.size() && kept[k] == node;
+    k += keep ? 1 : 0;
+    const std::span<const int> lights = scene.tree.LightsOf(node);
+    culled.of += std::ssize(lights);
+    culled.skipped += keep ? 0 : std::ssize(lights);
+    if (!cut_of_light_.empty()) {
+      for (const int light : lights) cut_of_light_[static_cast<size_t>(light)] = static_cast<int>(i);
     }
-    cut_.push_back(all < 2 ? Node{node} : Probe(node, texels, map, key, counters));
+    if (!keep) {
+      cut_.push_back({node, false});
+    } else {
+      cut_.push_back(all < 2 ? Node{node} : Probe(node, texels, map, key, counters));
+    }
+    shapes.push_back(scene.tree.ShapeOf(node));
+    shapes.back().intensity *= cut_.back().visibility;
   }
+  pack_ = LightPack(shapes);
 }
 
 TileLights::Node TileLights::Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
@@ -65,28 +77,31 @@ TileLights::Node TileLights::Probe(int node, std::span<const Texel> texels, cons
     ++counters.shadow_rays;
     seen += scene_.world.Occluded(ShadowRay(point, sample, probe_key)) ? 0 : 1;
   }
-  if (tried == 0) return {node, 1, false};
-  return {node, std::max(kUnseenShare, static_cast<float>(seen) / static_cast<float>(tried)), seen > 0};
+  if (tried == 0) return {node, true, false, 1};
+  // The root of the share: what counts is the mean of the square of what a sample brings.
+  const float share = static_cast<float>(seen) / static_cast<float>(tried);
+  return {node, true, seen > 0, std::sqrt(std::max(kUnseenShare, share))};
 }
 
 TileLights::Choice TileLights::ForTexel(const Texel& texel, float radius) const {
   Choice choice;
-  std::vector<float> weights;
-  const LightTree::Place place{texel.position, texel.flat ? texel.normal : Vec3f{}, radius};
+  if (cut_.empty()) return choice;
+  LightPack::Weights weights;
+  pack_.Weigh({texel.position, texel.flat ? texel.normal : Vec3f{}, radius}, 0, cut_.size(), weights);
   double seen = 0, unseen = 0;
-  for (const Node& node : cut_) {
-    const float unoccluded = scene_.tree.Importance(node.node, place);
-    choice.unoccluded += unoccluded;
-    weights.push_back(unoccluded * node.visibility);
-    choice.empty = choice.empty && !(weights.back() > 0);
-    (node.seen ? seen : unseen) += static_cast<double>(weights.back());
+  for (size_t i = 0; i < cut_.size(); ++i) {
+    const Node& node = cut_[i];
+    if (!node.kept) weights.of[i] = 0;
+    choice.unoccluded += weights.of[i] / node.visibility;
+    choice.empty = choice.empty && !(weights.of[i] > 0);
+    (node.seen ? seen : unseen) += static_cast<double>(weights.of[i]);
   }
   // Lights that no probe saw, however bright, get no more samples than those that were seen.
   if (seen > 0 && unseen > seen) {
     const float share = std::max(std::numeric_limits<float>::min(), static_cast<float>(seen / unseen));
-    for (size_t i = 0; i < cut_.size(); ++i) weights[i] *= cut_[i].seen ? 1 : share;
+    for (size_t i = 0; i < cut_.size(); ++i) weights.of[i] *= cut_[i].seen ? 1 : share;
   }
-  if (!choice.empty) choice.distribution = Distribution1D(weights);
+  if (!choice.empty) choice.distribution = Distribution1D(std::span(weights.of).first(cut_.size()));
   return choice;
 }
 
@@ -105,6 +120,27 @@ float TileLights::Probability(const Choice& choice, const SurfacePoint& point, i
   const float chosen = choice.distribution.Probability(at);
   if (!(chosen > 0)) return 0;
   return chosen * scene_.tree.Probability(cut_[static_cast<size_t>(at)].node, light, {point.position, point.normal});
+}
+
+LightTree::Pick TileLights::DrawNear(const SurfacePoint& point, float u) const {
+  LightPack::Weights weights;
+  pack_.Weigh({point.position, point.normal}, 0, cut_.size(), weights);
+  const DrawnWeight drawn = DrawWeight(weights, cut_.size(), u);
+  if (drawn.index < 0) return {};
+  LightTree::Pick pick =
+      scene_.tree.Draw(cut_[static_cast<size_t>(drawn.index)].node, {point.position, point.normal}, drawn.remainder);
+  pick.probability *= drawn.probability;
+  return pick;
+}
+
+float TileLights::ProbabilityNear(const SurfacePoint& point, int light) const {
+  LightPack::Weights weights;
+  pack_.Weigh({point.position, point.normal}, 0, cut_.size(), weights);
+  if (!(weights.total > 0)) return 0;
+  const auto at = static_cast<size_t>(cut_of_light_[static_cast<size_t>(light)]);
+  const float chosen = weights.of[at] / weights.total;
+  if (!(chosen > 0)) return 0;
+  return chosen * scene_.tree.Probability(cut_[at].node, light, {point.position, point.normal});
 }
 
 namespace {

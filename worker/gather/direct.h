@@ -32,18 +32,24 @@ class TileLights {
   LightTree::Pick Draw(const Choice& choice, const SurfacePoint& point, float u) const;
   float Probability(const Choice& choice, const SurfacePoint& point, int light) const;
 
+  // One light for any point near the tile.
+  LightTree::Pick DrawNear(const SurfacePoint& point, float u) const;
+  float ProbabilityNear(const SurfacePoint& point, int light) const;
+
  private:
   struct Node {
-    int node = 0;          // of the tree
-    float visibility = 1;  // (0, 1]
+    int node = 0;  // of the tree
+    bool kept = true;
     bool seen = true;      // by a probe, or there is nothing to choose from
+    float visibility = 1;  // (0, 1]
   };
   // With the share of a few probes from the tile's texels that see the node; 1 where none could tell.
   Node Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
              GatherCounters& counters) const;
 
   const GatherScene& scene_;
-  std::vector<Node> cut_;          // at most kMostNodes
+  std::vector<Node> cut_;          // at most LightPack::kMost
+  LightPack pack_;                 // of the cut, as much of them as is visible
   std::vector<int> cut_of_light_;  // per local light, -1 left out; where anything emits that rays can meet
 };
 

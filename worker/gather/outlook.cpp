@@ -32,7 +32,7 @@ Found Gather(const GatherScene& scene, const TexelPoint& point, uint32_t key, Ga
       return scene.tree.Probability(LightTree::kRoot, light, {point.surface.position, point.surface.normal});
     });
     if (hit) {
-      const GatheredRadiance reflected = ReflectedRadiance(scene, hit, ray_key, counters);
+      const GatheredRadiance reflected = ReflectedRadiance(scene, nullptr, hit, ray_key, counters);
       radiance += reflected.radiance;
       for (size_t g = 0; g < found.deviation.size(); ++g) {
         found.deviation[g] += kPi * static_cast<double>(reflected.group[g]) / kRays;

@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "worker/gather/direct.h"
 #include "worker/sample/hash.h"
 #include "worker/sample/mis.h"
 #include "worker/sample/warp.h"
@@ -41,10 +42,13 @@ void GatherCounters::Add(const GatherCounters& other) {
   skip.Add(other.skip);
 }
 
-Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters) {
+Rgb SampleDirect(const GatherScene& scene, const TileLights* lights, const SurfacePoint& point, uint32_t key,
+                 GatherCounters& counters) {
   Rgb irradiance;
   if (!scene.tree.empty()) {
-    const LightTree::Pick pick = scene.tree.Draw(LightTree::kRoot, {point.position, point.normal}, Random(key, 1));
+    const LightTree::Pick pick =
+        lights ? lights->DrawNear(point, Random(key, 1))
+               : scene.tree.Draw(LightTree::kRoot, {point.position, point.normal}, Random(key, 1));
     if (pick.light >= 0) {
       const LightSample sample = scene.lights.SampleLocal(pick.light, point.position, {Random(key, 2), Random(key, 3)});
       irradiance += Arriving(scene, point, sample, pick.probability, key, counters);
@@ -64,7 +68,8 @@ Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t k
   return irradiance;
 }
 
-GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, uint32_t key, GatherCounters& counters) {
+GatheredRadiance ReflectedRadiance(const GatherScene& scene, const TileLights* lights, const Hit& first, uint32_t key,
+                                   GatherCounters& counters) {
   GatheredRadiance result;
   Rgb throughput{1, 1, 1};
   Hit hit = first;
@@ -90,7 +95,7 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
       if (bounce == kMostBounces || Random(step_key, 10) >= survive) return result;
       throughput = throughput / survive;
     }
-    result.radiance += throughput * SampleDirect(scene, point, step_key, counters);
+    result.radiance += throughput * SampleDirect(scene, lights, point, step_key, counters);
     const Frame frame = FrameFromHint(point.normal, scene.world.triangles()[hit.triangle].e1);
     const Vec3f dir = frame.ToWorld(CosineHemisphere({Random(step_key, 8), Random(step_key, 9)}));
     ++counters.bounce_rays;
@@ -98,7 +103,9 @@ GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& first, u
     throughput = throughput * kPiF;  // cosine lobe: irradiance is pi times the radiance found
     const float pdf = std::max(0.0f, Dot(dir, point.normal)) * kInvPiF;
     result.radiance += throughput * FoundByRay(scene, point, dir, pdf, next, [&](int light) {
-                         return scene.tree.Probability(LightTree::kRoot, light, {point.position, point.normal});
+                         return lights
+                                    ? lights->ProbabilityNear(point, light)
+                                    : scene.tree.Probability(LightTree::kRoot, light, {point.position, point.normal});
                        });
     if (!next) return result;
     hit = next;

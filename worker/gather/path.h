@@ -7,6 +7,8 @@
 
 namespace bakewell {
 
+class TileLights;
+
 // What the gather reads; all of it immutable.
 struct GatherScene {
   const World& world;
@@ -38,13 +40,16 @@ struct GatheredRadiance {
 
 // Radiance reflected towards a gather ray's origin at `hit`, `distance` away: direct light sampled at the hit plus the
 // cache's indirect light; where the hit is nearer than a few bandwidths, or the cell is cut by other geometry, one
-// further bounce instead (theory.md 3, step 2). `key` decides all random numbers.
-GatheredRadiance ReflectedRadiance(const GatherScene& scene, const Hit& hit, uint32_t key, GatherCounters& counters);
+// further bounce instead (theory.md 3, step 2). `key` decides all random numbers. lights: of the tile whose texel
+// gathers; none: no place is known.
+GatheredRadiance ReflectedRadiance(const GatherScene& scene, const TileLights* lights, const Hit& hit, uint32_t key,
+                                   GatherCounters& counters);
 
-// Direct irradiance at a surface point by light sampling: one local light chosen by flux, every directional light, the
-// sky where it is not smooth. With multiple importance sampling (power heuristic) against a cosine lobe for lights
+// Direct irradiance at a surface point by light sampling: one local light, every directional light, the sky where it is
+// not smooth. With multiple importance sampling (power heuristic) against a cosine lobe for lights
 // that a bounce can hit.
-Rgb SampleDirect(const GatherScene& scene, const SurfacePoint& point, uint32_t key, GatherCounters& counters);
+Rgb SampleDirect(const GatherScene& scene, const TileLights* lights, const SurfacePoint& point, uint32_t key,
+                 GatherCounters& counters);
 
 // Radiance that a ray of density `pdf` finds by itself, emission and sky, weighted against samples of lights that are
 // drawn with chosen(light).

@@ -267,7 +267,7 @@ class TileGatherer {
     const float pdf = GatherPdf(ray.cosine);
     Rgb radiance = FoundByGather(scene_, lights_ ? &*lights_ : nullptr, work.choice, ray.from, ray.dir, pdf, ray.hit);
     GatheredRadiance reflected;
-    if (ray.hit) reflected = ReflectedRadiance(scene_, ray.hit, ray.key, counters_);
+    if (ray.hit) reflected = ReflectedRadiance(scene_, lights_ ? &*lights_ : nullptr, ray.hit, ray.key, counters_);
     // Multiple importance sampling went by the unguided density, here as in GatherDirect.
     radiance = (radiance + reflected.radiance) / ray.density;
     const Rgb irradiance = radiance * (ray.cosine / pdf);

@@ -13,30 +13,40 @@ namespace {
 constexpr float kSlackRad = 1e-3f;         // rounding of cones that are joined
 constexpr float kSlack = 1e-5f;            // rounding of the cosines that Importance compares
 constexpr float kClearlyFarther = 1.001f;  // more than rounding makes of equal distances
+constexpr float kLeastLobe = 0.02f;        // of a light's brightest direction, where it emits at all
+constexpr float kLeastPenumbra = 1e-3f;    // of a spot light, between cosines
 constexpr float kSplitSteps = 1000;        // places told apart along the line that lights are split along
 
-// What the tree asks of one light.
-struct LightShape {
-  Vec3f center;  // of a sphere around it [m]
-  float radius;
-  Vec3f axis;       // mean direction of emission
-  float cone_rad;   // half angle around it
-  float intensity;  // luminance, along its brightest direction [W sr^-1]
-};
-
-LightShape ShapeOf(const LightSet& lights, int light) {
+LightShape ShapeOfLight(const LightSet& lights, int light) {
+  LightShape shape;
   if (!lights.IsEmissive(light)) {
     const PunctualLight& punctual = lights.locals()[static_cast<size_t>(light)];
-    const bool spot = punctual.type == LightType::kSpot;
-    return {punctual.position, 0, spot ? punctual.direction : Vec3f{0, 0, 1},
-            spot ? std::acos(std::clamp(punctual.cos_outer, -1.0f, 1.0f)) : kPiF, Luminance(punctual.intensity)};
+    shape.center = punctual.position;
+    shape.cone_rad = kPiF;
+    shape.intensity = Luminance(punctual.intensity);
+    if (punctual.type != LightType::kSpot) return shape;
+    shape.axis = punctual.direction;
+    shape.cone_rad = std::acos(std::clamp(punctual.cos_outer, -1.0f, 1.0f));
+    shape.scale = 1 / std::max(punctual.cos_inner - punctual.cos_outer, kLeastPenumbra);
+    shape.offset = -punctual.cos_outer * shape.scale;
+    shape.least = kLeastLobe;
+    shape.squared = true;
+    return shape;
   }
   const EmissiveTriangle& emissive = lights.emissive()[static_cast<size_t>(light) - lights.locals().size()];
   const Triangle& t = lights.world().triangles()[emissive.triangle];
-  const Vec3f center = t.p0 + (t.e1 + t.e2) * (1.0f / 3);
-  LightShape shape{center, 0, t.normal, emissive.two_sided ? kPiF : kPiF / 2,
-                   Luminance(emissive.mean_radiance) * emissive.area};
-  for (const Vec3f p : {t.p0, t.p0 + t.e1, t.p0 + t.e2}) shape.radius = std::max(shape.radius, Length(p - center));
+  shape.center = t.p0 + (t.e1 + t.e2) * (1.0f / 3);
+  shape.axis = t.normal;
+  shape.cone_rad = kPiF / 2;
+  shape.two_sided = emissive.two_sided;
+  shape.intensity = Luminance(emissive.mean_radiance) * emissive.area;
+  shape.softness = 0.5f * emissive.area;
+  shape.scale = 1;
+  shape.offset = 0;
+  shape.least = kLeastLobe;
+  for (const Vec3f p : {t.p0, t.p0 + t.e1, t.p0 + t.e2}) {
+    shape.radius = std::max(shape.radius, Length(p - shape.center));
+  }
   return shape;
 }
 
@@ -78,25 +88,28 @@ LightTree::LightTree(const LightSet& lights) : set_(lights) {
   if (count == 0) return;
   lights_.resize(static_cast<size_t>(count));
   std::iota(lights_.begin(), lights_.end(), 0);
-  leaf_of_light_.assign(static_cast<size_t>(count), -1);
   nodes_.reserve(2 * static_cast<size_t>(count));
-  Build(0, count, -1);
+  Build(0, count);
+  place_of_light_.resize(lights_.size());
+  std::vector<LightShape> shapes;
+  for (size_t i = 0; i < lights_.size(); ++i) {
+    place_of_light_[static_cast<size_t>(lights_[i])] = static_cast<int>(i);
+    shapes.push_back(ShapeOfLight(lights, lights_[i]));
+  }
+  pack_ = LightPack(shapes);
 }
 
-int LightTree::Build(int begin, int end, int parent) {
+int LightTree::Build(int begin, int end) {
   const int at = static_cast<int>(nodes_.size());
   nodes_.push_back({});
   nodes_.back().begin = begin;
   nodes_.back().end = end;
-  nodes_.back().parent = parent;
-  if (end - begin == 1) {
-    leaf_of_light_[static_cast<size_t>(lights_[static_cast<size_t>(begin)])] = at;
-  } else {
+  if (end - begin > 1) {
     // Halves along the line between two lights far from each other: no axis of the world's, so that a turned level has
     // the same tree.
     std::vector<std::pair<Vec3f, int>> centers;
     for (int i = begin; i < end; ++i) {
-      const LightShape shape = ShapeOf(set_, lights_[static_cast<size_t>(i)]);
+      const LightShape shape = ShapeOfLight(set_, lights_[static_cast<size_t>(i)]);
       centers.push_back({shape.center, lights_[static_cast<size_t>(i)]});
     }
     const Vec3f first = FarthestFrom(centers.front().first, centers);
@@ -119,7 +132,7 @@ int LightTree::Build(int begin, int end, int parent) {
       lights_[static_cast<size_t>(i)] = std::get<1>(order[static_cast<size_t>(i - begin)]);
     }
     const int half = begin + (end - begin) / 2;
-    const int left = Build(begin, half, at), right = Build(half, end, at);
+    const int left = Build(begin, half), right = Build(half, end);
     nodes_[static_cast<size_t>(at)].left = left;
     nodes_[static_cast<size_t>(at)].right = right;
   }
@@ -130,11 +143,11 @@ int LightTree::Build(int begin, int end, int parent) {
 void LightTree::Enclose(Node& node) const {
   if (node.left < 0) {
     const int light = lights_[static_cast<size_t>(node.begin)];
-    const LightShape shape = ShapeOf(set_, light);
+    const LightShape shape = ShapeOfLight(set_, light);
     node.center = shape.center;
     node.radius = shape.radius;
     node.axis = shape.axis;
-    node.cone_rad = std::min(kPiF, shape.cone_rad + kSlackRad);
+    node.cone_rad = shape.two_sided ? kPiF : std::min(kPiF, shape.cone_rad + kSlackRad);
     node.cos_cone = std::cos(node.cone_rad);
     node.sin_cone = std::sin(node.cone_rad);
     node.intensity = shape.intensity;
@@ -216,46 +229,67 @@ std::vector<int> LightTree::Cull(std::span<const int> cut, const Place& place, f
   return kept;
 }
 
+LightShape LightTree::ShapeOf(int node) const {
+  const Node& n = nodes_[static_cast<size_t>(node)];
+  if (n.left < 0) return ShapeOfLight(set_, lights_[static_cast<size_t>(n.begin)]);
+  return {.center = n.center,
+          .radius = n.radius,
+          .axis = n.axis,
+          .cone_rad = n.cone_rad,
+          .intensity = n.intensity,
+          .softness = 0.25f * n.radius * n.radius};
+}
+
 LightTree::Pick LightTree::Draw(int node, const Place& place, float u) const {
   Pick pick;
   double probability = 1, rest = static_cast<double>(u);
-  while (!IsLeaf(node)) {
-    const Node& n = nodes_[static_cast<size_t>(node)];
-    const double left = static_cast<double>(Importance(n.left, place));
-    const double right = static_cast<double>(Importance(n.right, place));
+  const Node* n = &nodes_[static_cast<size_t>(node)];
+  while (CountOf(*n) > LightPack::kMost) {
+    const double left = static_cast<double>(Importance(n->left, place));
+    const double right = static_cast<double>(Importance(n->right, place));
     if (!(left + right > 0)) return pick;
     const double share = left / (left + right);
     if (rest < share) {
       rest /= share;
       probability *= share;
-      node = n.left;
+      n = &nodes_[static_cast<size_t>(n->left)];
     } else {
       if (!(share < 1)) return pick;
       rest = std::min((rest - share) / (1 - share), 1 - 0x1p-53);
       probability *= 1 - share;
-      node = n.right;
+      n = &nodes_[static_cast<size_t>(n->right)];
     }
   }
-  pick.light = lights_[static_cast<size_t>(nodes_[static_cast<size_t>(node)].begin)];
-  pick.probability = static_cast<float>(probability);
+  const auto begin = static_cast<size_t>(n->begin);
+  if (CountOf(*n) == 1) return {lights_[begin], static_cast<float>(probability)};
+  LightPack::Weights weights;
+  pack_.Weigh(place, begin, static_cast<size_t>(n->end), weights);
+  const DrawnWeight drawn = DrawWeight(weights, CountOf(*n), static_cast<float>(rest));
+  if (drawn.index < 0) return pick;
+  pick.light = lights_[begin + static_cast<size_t>(drawn.index)];
+  pick.probability = static_cast<float>(probability) * drawn.probability;
   return pick;
 }
 
 float LightTree::Probability(int node, int light, const Place& place) const {
+  const int at = place_of_light_[static_cast<size_t>(light)];
+  const Node* n = &nodes_[static_cast<size_t>(node)];
+  if (at < n->begin || at >= n->end) return 0;
   double probability = 1;
-  int at = leaf_of_light_[static_cast<size_t>(light)];
-  while (at != node) {
-    const int parent = nodes_[static_cast<size_t>(at)].parent;
-    if (parent < 0) return 0;
-    const Node& n = nodes_[static_cast<size_t>(parent)];
-    const double left = static_cast<double>(Importance(n.left, place));
-    const double right = static_cast<double>(Importance(n.right, place));
+  while (CountOf(*n) > LightPack::kMost) {
+    const double left = static_cast<double>(Importance(n->left, place));
+    const double right = static_cast<double>(Importance(n->right, place));
     if (!(left + right > 0)) return 0;
     const double share = left / (left + right);
-    probability *= at == n.left ? share : 1 - share;
-    at = parent;
+    const Node& left_node = nodes_[static_cast<size_t>(n->left)];
+    probability *= at < left_node.end ? share : 1 - share;
+    n = at < left_node.end ? &left_node : &nodes_[static_cast<size_t>(n->right)];
   }
-  return static_cast<float>(probability);
+  if (CountOf(*n) == 1) return static_cast<float>(probability);
+  LightPack::Weights weights;
+  pack_.Weigh(place, static_cast<size_t>(n->begin), static_cast<size_t>(n->end), weights);
+  if (!(weights.total > 0)) return 0;
+  return static_cast<float>(probability) * weights.of[static_cast<size_t>(at - n->begin)] / weights.total;
 }
 
 std::span<const int> LightTree::LightsOf(int node) const {

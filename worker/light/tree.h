@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "worker/light/lights.h"
+#include "worker/light/pack.h"
 
 namespace bakewell {
 
@@ -17,11 +18,7 @@ class LightTree {
   bool empty() const { return nodes_.empty(); }
   static constexpr int kRoot = 0;
 
-  // A place that wants light: the points within `radius` of `position` on a plane with unit `normal` (zero: any).
-  struct Place {
-    Vec3f position, normal;
-    float radius = 0;
-  };
+  using Place = LitPlace;
 
   // About the unoccluded irradiance (luminance) that a node brings to a place, exactly 0 only where it brings none.
   float Importance(int node, const Place& place) const;
@@ -30,7 +27,8 @@ class LightTree {
     int light = -1;         // -1: none of the node's lights reaches the place
     float probability = 0;  // of the light, given the node
   };
-  // One light of a node; u in [0, 1).
+  // One light of a node; u in [0, 1). Down to LightPack::kMost lights it chooses between halves, then among them all: a
+  // half whose lights are near and far, in front and behind is badly told by its sphere and its cone.
   Pick Draw(int node, const Place& place, float u) const;
   // With which probability Draw gives a light of the node.
   float Probability(int node, int light, const Place& place) const;
@@ -45,6 +43,7 @@ class LightTree {
   std::vector<int> Cull(std::span<const int> cut, const Place& place, float dispensable) const;
   // All lights of a node.
   std::span<const int> LightsOf(int node) const;
+  LightShape ShapeOf(int node) const;
   bool IsLeaf(int node) const { return nodes_[static_cast<size_t>(node)].left < 0; }
 
  private:
@@ -55,15 +54,17 @@ class LightTree {
     float cone_rad = 0;   // its half angle, falloff included; pi: to everywhere
     float cos_cone = 1, sin_cone = 0;
     float intensity = 0;  // luminance, of all together along their brightest directions [W sr^-1]
-    int left = -1, right = -1, parent = -1;
+    int left = -1, right = -1;
     int begin = 0, end = 0;  // lights_[begin, end)
   };
-  int Build(int begin, int end, int parent);
+  int Build(int begin, int end);
   void Enclose(Node& node) const;
+  static size_t CountOf(const Node& node) { return static_cast<size_t>(node.end - node.begin); }
 
   const LightSet& set_;
-  std::vector<int> lights_;         // light numbers, so that every node's are consecutive
-  std::vector<int> leaf_of_light_;  // node
+  std::vector<int> lights_;          // light numbers, so that every node's are consecutive
+  std::vector<int> place_of_light_;  // in lights_
+  LightPack pack_;                   // of lights_
   std::vector<Node> nodes_;
 };
 

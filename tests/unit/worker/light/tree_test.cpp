@@ -163,7 +163,8 @@ TEST(LightTree, IsQuieterThanAChoiceByFlux) {
     by_tree += square_tree / (mean * mean) / 50;
     by_flux += square_flux / (mean * mean) / 50;
   }
-  EXPECT_LT(by_tree, by_flux / 3) << by_tree << " against " << by_flux;
+  // Of a perfect choice 1. Halves all the way down: 16.3; by flux 73.
+  EXPECT_LT(by_tree, 3) << by_tree << " against " << by_flux;
 }
 
 }  // namespace
