@@ -15,8 +15,8 @@ constexpr uint32_t kProbesPerNode = 8;
 constexpr float kUnseenShare = 0.05f;  // a light that no probe saw keeps this share of its importance
 
 // A sphere around the texels' centres.
-LightTree::Place Around(std::span<const Texel> texels) {
-  LightTree::Place place;
+LitPlace Around(std::span<const Texel> texels) {
+  LitPlace place;
   for (const Texel& texel : texels) place.position += texel.position / static_cast<float>(texels.size());
   for (const Texel& texel : texels) place.radius = std::max(place.radius, Length(texel.position - place.position));
   return place;
@@ -31,7 +31,7 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
   const std::span<const Texel> texels = std::span(map.texels).subspan(begin, end - begin);
   const int all = scene.lights.local_count();
   if (!scene.lights.emissive().empty()) cut_of_light_.assign(static_cast<size_t>(all), -1);
-  const LightTree::Place place = Around(texels);
+  const LitPlace place = Around(texels);
   const std::vector<int> cut = scene.tree.Cut(place, LightPack::kMost);
   const std::vector<int> kept = scene.tree.Cull(cut, place, dispensable);
   SkipCount& culled = counters.skip[Skip::kCulledLights];

@@ -15,6 +15,9 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // Of the points on a near triangle whose emission varies, by emission; the others by solid angle.
 constexpr float kTableShare = 0.9f;
 
+constexpr float kLeastLobe = 0.02f;      // of a light's brightest direction, where it emits at all
+constexpr float kLeastPenumbra = 1e-3f;  // of a spot light, between cosines
+
 }  // namespace
 
 float SpotFalloff(const PunctualLight& light, float cos_angle) {
@@ -155,56 +158,36 @@ LightSample LightSet::SampleEnvironment(Vec2f u) const {
   return sample;
 }
 
-namespace {
-
-// Largest cosine between a plane's normal and the direction to a light at height `height` (a point's, plus what the
-// region around it adds); never quite zero for lights in front.
-float SurfaceCosine(float height, float distance, Vec3f normal) {
-  if (Dot(normal, normal) < 0.5f) return 1;
-  if (height <= 0) return 0;
-  return std::clamp(height / distance, 0.01f, 1.0f);
-}
-
-// SpotFalloff's maximum over directions within the angle whose sine is `sin_delta`.
-float WidenedFalloff(const PunctualLight& light, float cos_angle, float sin_delta) {
-  const float cos_delta = std::sqrt(std::max(0.0f, 1 - sin_delta * sin_delta));
-  if (cos_angle >= cos_delta) return 1;
-  const float sin_angle = std::sqrt(std::max(0.0f, 1 - cos_angle * cos_angle));
-  return SpotFalloff(light, cos_angle * cos_delta + sin_angle * sin_delta);
-}
-
-}  // namespace
-
-float LightSet::ImportanceOfTriangle(const EmissiveTriangle& light, Vec3f position, Vec3f normal, float radius) const {
-  const Triangle& t = world_.triangles()[light.triangle];
-  const Vec3f corners[3] = {t.p0 - position, t.p0 + t.e1 - position, t.p0 + t.e2 - position};
-  const float facing = -Dot(corners[0], t.normal) + radius;
-  if (facing <= 0 && !light.two_sided) return 0;
-  float height = -kInfinity;
-  for (const Vec3f c : corners) height = std::max(height, Dot(c, normal));
-  const Vec3f center = (corners[0] + corners[1] + corners[2]) * (1.0f / 3);
-  const float distance2 = Dot(center, center) + 0.5f * light.area + radius * radius;
-  const float distance = std::sqrt(distance2);
-  const float cos_light = std::clamp(std::fabs(facing) / distance, 0.02f, 1.0f);
-  return Luminance(light.mean_radiance) * light.area * SurfaceCosine(height + radius, distance, normal) * cos_light /
-         distance2;
-}
-
-float LightSet::Importance(int light, Vec3f position, Vec3f normal, float radius) const {
+LightShape LightSet::ShapeOf(int light) const {
+  LightShape shape;
   if (IsEmissive(light)) {
-    return ImportanceOfTriangle(emissive_[static_cast<size_t>(light) - locals_.size()], position, normal, radius);
+    const EmissiveTriangle& emissive = emissive_[static_cast<size_t>(light) - locals_.size()];
+    const Triangle& t = world_.triangles()[emissive.triangle];
+    shape.center = t.p0 + (t.e1 + t.e2) * (1.0f / 3);
+    for (const Vec3f p : {t.p0, t.p0 + t.e1, t.p0 + t.e2}) {
+      shape.radius = std::max(shape.radius, Length(p - shape.center));
+    }
+    shape.axis = t.normal;
+    shape.cone_rad = kPiF / 2;
+    shape.two_sided = emissive.two_sided;
+    shape.intensity = Luminance(emissive.mean_radiance) * emissive.area;
+    shape.softness = 0.5f * emissive.area;
+    shape.scale = 1;
+    shape.offset = 0;
+    shape.least = kLeastLobe;
+    return shape;
   }
   const PunctualLight& punctual = locals_[light];
-  const Vec3f to_light = punctual.position - position;
-  const float distance2 = Dot(to_light, to_light) + radius * radius;
-  const float distance = std::sqrt(distance2);
-  if (!(distance > 0)) return 0;
-  const float to_center = Length(to_light);
-  const float falloff = radius >= to_center ? 1.0f
-                                            : WidenedFalloff(punctual, -Dot(to_light, punctual.direction) / to_center,
-                                                             radius / to_center);
-  return Luminance(punctual.intensity) * falloff * SurfaceCosine(Dot(to_light, normal) + radius, distance, normal) /
-         distance2;
+  shape.center = punctual.position;
+  shape.intensity = Luminance(punctual.intensity);
+  if (punctual.type != LightType::kSpot) return shape;
+  shape.axis = punctual.direction;
+  shape.cone_rad = std::acos(std::clamp(punctual.cos_outer, -1.0f, 1.0f));
+  shape.scale = 1 / std::max(punctual.cos_inner - punctual.cos_outer, kLeastPenumbra);
+  shape.offset = -punctual.cos_outer * shape.scale;
+  shape.least = kLeastLobe;
+  shape.squared = true;
+  return shape;
 }
 
 float LightSet::Power(int light) const {

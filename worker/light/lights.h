@@ -4,6 +4,7 @@
 
 #include "worker/light/emission_patterns.h"
 #include "worker/light/environment.h"
+#include "worker/light/pack.h"
 #include "worker/trace/world.h"
 
 namespace bakewell {
@@ -60,10 +61,8 @@ class LightSet {
   LightSample SampleDirectional(int directional, Vec2f u) const;
   LightSample SampleEnvironment(Vec2f u) const;
 
-  // About the unoccluded irradiance (luminance) that a local light brings to the points within `radius` of `position`
-  // on a plane with unit `normal` (zero: any orientation), to choose among lights. Exactly 0 only where the light
-  // reaches no such point.
-  float Importance(int light, Vec3f position, Vec3f normal, float radius) const;
+  // What a local light looks like to a choice among many.
+  LightShape ShapeOf(int light) const;
   // Radiated flux (luminance) [W].
   float Power(int light) const;
 
@@ -75,7 +74,6 @@ class LightSet {
   LightSample SampleTriangle(const EmissiveTriangle& light, Vec3f position, Vec2f u) const;
   float Pdf(const EmissiveTriangle& light, float solid_angle, Vec2f barycentrics, float cos_light,
             float distance) const;
-  float ImportanceOfTriangle(const EmissiveTriangle& light, Vec3f position, Vec3f normal, float radius) const;
 
   const World& world_;
   EmissionPatterns patterns_;

@@ -21,7 +21,7 @@ struct LightShape {
   Vec3f center;
   float radius = 0;        // [m]
   Vec3f axis{0, 0, 1};     // unit, of the cone of emission
-  float cone_rad = 0;      // its half angle, falloff included; pi: to everywhere
+  float cone_rad = kPiF;   // its half angle, falloff included; pi: to everywhere
   bool two_sided = false;  // the cone opens along -axis as well
   float intensity = 0;     // luminance, of all together along their brightest directions [W sr^-1]
   float softness = 0;      // added to the square of the distance [m^2]

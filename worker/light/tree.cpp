@@ -11,44 +11,8 @@ namespace bakewell {
 namespace {
 
 constexpr float kSlackRad = 1e-3f;         // rounding of cones that are joined
-constexpr float kSlack = 1e-5f;            // rounding of the cosines that Importance compares
 constexpr float kClearlyFarther = 1.001f;  // more than rounding makes of equal distances
-constexpr float kLeastLobe = 0.02f;        // of a light's brightest direction, where it emits at all
-constexpr float kLeastPenumbra = 1e-3f;    // of a spot light, between cosines
 constexpr float kSplitSteps = 1000;        // places told apart along the line that lights are split along
-
-LightShape ShapeOfLight(const LightSet& lights, int light) {
-  LightShape shape;
-  if (!lights.IsEmissive(light)) {
-    const PunctualLight& punctual = lights.locals()[static_cast<size_t>(light)];
-    shape.center = punctual.position;
-    shape.cone_rad = kPiF;
-    shape.intensity = Luminance(punctual.intensity);
-    if (punctual.type != LightType::kSpot) return shape;
-    shape.axis = punctual.direction;
-    shape.cone_rad = std::acos(std::clamp(punctual.cos_outer, -1.0f, 1.0f));
-    shape.scale = 1 / std::max(punctual.cos_inner - punctual.cos_outer, kLeastPenumbra);
-    shape.offset = -punctual.cos_outer * shape.scale;
-    shape.least = kLeastLobe;
-    shape.squared = true;
-    return shape;
-  }
-  const EmissiveTriangle& emissive = lights.emissive()[static_cast<size_t>(light) - lights.locals().size()];
-  const Triangle& t = lights.world().triangles()[emissive.triangle];
-  shape.center = t.p0 + (t.e1 + t.e2) * (1.0f / 3);
-  shape.axis = t.normal;
-  shape.cone_rad = kPiF / 2;
-  shape.two_sided = emissive.two_sided;
-  shape.intensity = Luminance(emissive.mean_radiance) * emissive.area;
-  shape.softness = 0.5f * emissive.area;
-  shape.scale = 1;
-  shape.offset = 0;
-  shape.least = kLeastLobe;
-  for (const Vec3f p : {t.p0, t.p0 + t.e1, t.p0 + t.e2}) {
-    shape.radius = std::max(shape.radius, Length(p - shape.center));
-  }
-  return shape;
-}
 
 // Of equally far ones, but for rounding, the first.
 Vec3f FarthestFrom(Vec3f from, const std::vector<std::pair<Vec3f, int>>& points) {
@@ -64,7 +28,7 @@ Vec3f FarthestFrom(Vec3f from, const std::vector<std::pair<Vec3f, int>>& points)
   return result;
 }
 
-float SineOf(float cosine) { return std::sqrt(std::max(0.0f, 1 - cosine * cosine)); }
+float ConeOf(const LightShape& shape) { return shape.two_sided ? kPiF : shape.cone_rad; }
 
 float AngleBetween(Vec3f a, Vec3f b) { return std::acos(std::clamp(Dot(a, b), -1.0f, 1.0f)); }
 
@@ -91,12 +55,14 @@ LightTree::LightTree(const LightSet& lights) : set_(lights) {
   nodes_.reserve(2 * static_cast<size_t>(count));
   Build(0, count);
   place_of_light_.resize(lights_.size());
-  std::vector<LightShape> shapes;
+  std::vector<LightShape> shapes, node_shapes;
   for (size_t i = 0; i < lights_.size(); ++i) {
     place_of_light_[static_cast<size_t>(lights_[i])] = static_cast<int>(i);
-    shapes.push_back(ShapeOfLight(lights, lights_[i]));
+    shapes.push_back(lights.ShapeOf(lights_[i]));
   }
   pack_ = LightPack(shapes);
+  for (const Node& node : nodes_) node_shapes.push_back(node.shape);
+  node_pack_ = LightPack(node_shapes);
 }
 
 int LightTree::Build(int begin, int end) {
@@ -109,8 +75,8 @@ int LightTree::Build(int begin, int end) {
     // the same tree.
     std::vector<std::pair<Vec3f, int>> centers;
     for (int i = begin; i < end; ++i) {
-      const LightShape shape = ShapeOfLight(set_, lights_[static_cast<size_t>(i)]);
-      centers.push_back({shape.center, lights_[static_cast<size_t>(i)]});
+      const int light = lights_[static_cast<size_t>(i)];
+      centers.push_back({set_.ShapeOf(light).center, light});
     }
     const Vec3f first = FarthestFrom(centers.front().first, centers);
     const Vec3f line = FarthestFrom(first, centers) - first;
@@ -136,82 +102,49 @@ int LightTree::Build(int begin, int end) {
     nodes_[static_cast<size_t>(at)].left = left;
     nodes_[static_cast<size_t>(at)].right = right;
   }
-  Enclose(nodes_[static_cast<size_t>(at)]);
+  nodes_[static_cast<size_t>(at)].shape = Enclose(nodes_[static_cast<size_t>(at)]);
   return at;
 }
 
-void LightTree::Enclose(Node& node) const {
-  if (node.left < 0) {
-    const int light = lights_[static_cast<size_t>(node.begin)];
-    const LightShape shape = ShapeOfLight(set_, light);
-    node.center = shape.center;
-    node.radius = shape.radius;
-    node.axis = shape.axis;
-    node.cone_rad = shape.two_sided ? kPiF : std::min(kPiF, shape.cone_rad + kSlackRad);
-    node.cos_cone = std::cos(node.cone_rad);
-    node.sin_cone = std::sin(node.cone_rad);
-    node.intensity = shape.intensity;
-    return;
-  }
-  const Node &a = nodes_[static_cast<size_t>(node.left)], &b = nodes_[static_cast<size_t>(node.right)];
+LightShape LightTree::Enclose(const Node& node) const {
+  if (node.left < 0) return set_.ShapeOf(lights_[static_cast<size_t>(node.begin)]);
+  const LightShape &a = nodes_[static_cast<size_t>(node.left)].shape,
+                   &b = nodes_[static_cast<size_t>(node.right)].shape;
+  LightShape shape;
   const float distance = Length(b.center - a.center);
   if (a.radius >= distance + b.radius || b.radius >= distance + a.radius) {
-    const Node& larger = a.radius >= b.radius ? a : b;
-    node.center = larger.center;
-    node.radius = larger.radius;
+    const LightShape& larger = a.radius >= b.radius ? a : b;
+    shape.center = larger.center;
+    shape.radius = larger.radius;
   } else {
-    node.radius = 0.5f * (distance + a.radius + b.radius);
-    node.center = a.center + (b.center - a.center) * ((node.radius - a.radius) / distance);
+    shape.radius = 0.5f * (distance + a.radius + b.radius);
+    shape.center = a.center + (b.center - a.center) * ((shape.radius - a.radius) / distance);
   }
-  node.radius *= 1.0001f;
-  std::tie(node.axis, node.cone_rad) = Join(a.axis, a.cone_rad, b.axis, b.cone_rad);
-  node.cos_cone = std::cos(node.cone_rad);
-  node.sin_cone = std::sin(node.cone_rad);
-  node.intensity = a.intensity + b.intensity;
+  shape.radius *= 1.0001f;
+  shape.softness = 0.25f * shape.radius * shape.radius;
+  std::tie(shape.axis, shape.cone_rad) = Join(a.axis, ConeOf(a), b.axis, ConeOf(b));
+  shape.intensity = a.intensity + b.intensity;
+  return shape;
 }
 
-float LightTree::Importance(int node, const Place& place) const {
-  const Node& n = nodes_[static_cast<size_t>(node)];
-  if (n.left < 0) {
-    return set_.Importance(lights_[static_cast<size_t>(n.begin)], place.position, place.normal, place.radius);
-  }
-  const Vec3f to_light = n.center - place.position;
-  const float reach = n.radius + place.radius, distance = Length(to_light);
-  const float distance2 = std::max(distance * distance, 0.25f * reach * reach);
-  if (distance <= reach || !(distance > 0)) return n.intensity / std::max(distance2, 1e-30f);
-  const Vec3f dir = to_light / distance;
-  // Directions to the lights lie within an angle of this sine of `dir`.
-  const float sin_spread = reach / distance, cos_spread = std::sqrt(1 - sin_spread * sin_spread);
-  float cosine = 1;
-  if (Dot(place.normal, place.normal) > 0.5f) {
-    const float facing = Dot(place.normal, dir);
-    if (facing < cos_spread) {
-      // Of the angle to the normal, less the spread.
-      cosine = facing * cos_spread + SineOf(facing) * sin_spread;
-      if (cosine <= -kSlack) return 0;
-      cosine = std::max(0.01f, cosine);
-    }
-  }
-  // The cone widened by the spread, unless that is everywhere.
-  if (n.sin_cone * cos_spread + n.cos_cone * sin_spread > 0 &&
-      -Dot(n.axis, dir) <= n.cos_cone * cos_spread - n.sin_cone * sin_spread - kSlack) {
-    return 0;
-  }
-  return n.intensity * cosine / distance2;
+float LightTree::Importance(int node, const LitPlace& place) const {
+  LightPack::Weights weights;
+  node_pack_.Weigh(place, static_cast<size_t>(node), static_cast<size_t>(node) + 1, weights);
+  return weights.total;
 }
 
-float LightTree::Bound(int node, const Place& place) const {
-  const Node& n = nodes_[static_cast<size_t>(node)];
-  const Vec3f to_light = n.center - place.position;
-  const float reach = n.radius + place.radius, distance = Length(to_light);
+float LightTree::Bound(int node, const LitPlace& place) const {
+  const LightShape& shape = nodes_[static_cast<size_t>(node)].shape;
+  const Vec3f to_light = shape.center - place.position;
+  const float reach = shape.radius + place.radius, distance = Length(to_light);
   const float least = distance * (1 - 1e-5f) - reach;
   if (!(least > 0)) return std::numeric_limits<float>::infinity();
-  const float spread = std::asin(std::min(1.0f, reach / distance)) + kSlackRad;
-  if (AngleBetween(n.axis, -to_light / distance) - spread >= n.cone_rad) return 0;
-  return n.intensity / (least * least);
+  const float spread = std::asin(std::min(1.0f, reach / distance)) + 2 * kSlackRad;
+  if (AngleBetween(shape.axis, -to_light / distance) - spread >= ConeOf(shape)) return 0;
+  return shape.intensity / (least * least);
 }
 
-std::vector<int> LightTree::Cull(std::span<const int> cut, const Place& place, float dispensable) const {
+std::vector<int> LightTree::Cull(std::span<const int> cut, const LitPlace& place, float dispensable) const {
   std::vector<std::pair<float, int>> weakest;
   for (const int node : cut) weakest.push_back({Bound(node, place), node});
   std::sort(weakest.begin(), weakest.end());
@@ -229,18 +162,7 @@ std::vector<int> LightTree::Cull(std::span<const int> cut, const Place& place, f
   return kept;
 }
 
-LightShape LightTree::ShapeOf(int node) const {
-  const Node& n = nodes_[static_cast<size_t>(node)];
-  if (n.left < 0) return ShapeOfLight(set_, lights_[static_cast<size_t>(n.begin)]);
-  return {.center = n.center,
-          .radius = n.radius,
-          .axis = n.axis,
-          .cone_rad = n.cone_rad,
-          .intensity = n.intensity,
-          .softness = 0.25f * n.radius * n.radius};
-}
-
-LightTree::Pick LightTree::Draw(int node, const Place& place, float u) const {
+LightTree::Pick LightTree::Draw(int node, const LitPlace& place, float u) const {
   Pick pick;
   double probability = 1, rest = static_cast<double>(u);
   const Node* n = &nodes_[static_cast<size_t>(node)];
@@ -271,7 +193,7 @@ LightTree::Pick LightTree::Draw(int node, const Place& place, float u) const {
   return pick;
 }
 
-float LightTree::Probability(int node, int light, const Place& place) const {
+float LightTree::Probability(int node, int light, const LitPlace& place) const {
   const int at = place_of_light_[static_cast<size_t>(light)];
   const Node* n = &nodes_[static_cast<size_t>(node)];
   if (at < n->begin || at >= n->end) return 0;
@@ -297,7 +219,7 @@ std::span<const int> LightTree::LightsOf(int node) const {
   return std::span(lights_).subspan(static_cast<size_t>(n.begin), static_cast<size_t>(n.end - n.begin));
 }
 
-std::vector<int> LightTree::Cut(const Place& place, size_t most) const {
+std::vector<int> LightTree::Cut(const LitPlace& place, size_t most) const {
   std::vector<int> cut;
   if (empty()) return cut;
   using Candidate = std::pair<float, int>;

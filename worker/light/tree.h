@@ -18,10 +18,8 @@ class LightTree {
   bool empty() const { return nodes_.empty(); }
   static constexpr int kRoot = 0;
 
-  using Place = LitPlace;
-
   // About the unoccluded irradiance (luminance) that a node brings to a place, exactly 0 only where it brings none.
-  float Importance(int node, const Place& place) const;
+  float Importance(int node, const LitPlace& place) const;
 
   struct Pick {
     int light = -1;         // -1: none of the node's lights reaches the place
@@ -29,42 +27,37 @@ class LightTree {
   };
   // One light of a node; u in [0, 1). Down to LightPack::kMost lights it chooses between halves, then among them all: a
   // half whose lights are near and far, in front and behind is badly told by its sphere and its cone.
-  Pick Draw(int node, const Place& place, float u) const;
+  Pick Draw(int node, const LitPlace& place, float u) const;
   // With which probability Draw gives a light of the node.
-  float Probability(int node, int light, const Place& place) const;
+  float Probability(int node, int light, const LitPlace& place) const;
 
   // Nodes that hold every light once, at most `most` of them, split where their light at the place is strongest; by the
   // first light that they hold.
-  std::vector<int> Cut(const Place& place, size_t most) const;
+  std::vector<int> Cut(const LitPlace& place, size_t most) const;
   // At least the unoccluded irradiance (luminance) that a node's lights bring together to any point of a place,
   // whichever way it faces: intensity over the square of the least distance, nothing from behind their cones.
-  float Bound(int node, const Place& place) const;
+  float Bound(int node, const LitPlace& place) const;
   // The nodes of `cut` without the weakest, whose bounds together stay within `dispensable`.
-  std::vector<int> Cull(std::span<const int> cut, const Place& place, float dispensable) const;
+  std::vector<int> Cull(std::span<const int> cut, const LitPlace& place, float dispensable) const;
   // All lights of a node.
   std::span<const int> LightsOf(int node) const;
-  LightShape ShapeOf(int node) const;
+  const LightShape& ShapeOf(int node) const { return nodes_[static_cast<size_t>(node)].shape; }
   bool IsLeaf(int node) const { return nodes_[static_cast<size_t>(node)].left < 0; }
 
  private:
   struct Node {
-    Vec3f center;
-    float radius = 0;     // of the sphere around the lights [m]
-    Vec3f axis{0, 0, 1};  // of the cone of emission
-    float cone_rad = 0;   // its half angle, falloff included; pi: to everywhere
-    float cos_cone = 1, sin_cone = 0;
-    float intensity = 0;  // luminance, of all together along their brightest directions [W sr^-1]
+    LightShape shape;  // that holds its lights
     int left = -1, right = -1;
     int begin = 0, end = 0;  // lights_[begin, end)
   };
   int Build(int begin, int end);
-  void Enclose(Node& node) const;
+  LightShape Enclose(const Node& node) const;
   static size_t CountOf(const Node& node) { return static_cast<size_t>(node.end - node.begin); }
 
   const LightSet& set_;
   std::vector<int> lights_;          // light numbers, so that every node's are consecutive
   std::vector<int> place_of_light_;  // in lights_
-  LightPack pack_;                   // of lights_
+  LightPack pack_, node_pack_;       // of lights_, of nodes_
   std::vector<Node> nodes_;
 };
 

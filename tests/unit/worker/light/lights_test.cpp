@@ -96,7 +96,14 @@ bool Reaches(const Lit& lit, TestRandom& random, int light, Vec3f position, Vec3
   return false;
 }
 
-TEST(LightSet, ImportanceIsPositiveWhereverALightReaches) {
+float WeightOf(const LightSet& lights, int light, const LitPlace& place) {
+  const LightShape shape = lights.ShapeOf(light);
+  LightPack::Weights weights;
+  LightPack(std::span(&shape, 1)).Weigh(place, 0, 1, weights);
+  return weights.total;
+}
+
+TEST(LightSet, ShapesHaveAWeightWhereverTheirLightReaches) {
   int reached = 0, missed = 0;
   for (uint32_t seed = 10; seed < 20; ++seed) {
     const Lit lit(ManyLights(seed));
@@ -109,7 +116,7 @@ TEST(LightSet, ImportanceIsPositiveWhereverALightReaches) {
       const Vec3f normal = i % 4 == 0 ? Vec3f{} : random.Direction();
       if (!Reaches(lit, random, light, position, normal, radius)) continue;
       ++reached;
-      if (lit.lights->Importance(light, position, normal, radius) > 0) continue;
+      if (WeightOf(*lit.lights, light, {position, normal, radius}) > 0) continue;
       if (++missed <= 3) {
         ADD_FAILURE() << "light " << light << (lit.lights->IsEmissive(light) ? " (triangle)" : " (punctual)")
                       << " seed " << seed << " case " << i << " radius " << radius;
@@ -120,7 +127,7 @@ TEST(LightSet, ImportanceIsPositiveWhereverALightReaches) {
   EXPECT_EQ(missed, 0) << "of " << reached;
 }
 
-TEST(LightSet, ImportanceOfASpotCountsTheRimOfTheRegion) {
+TEST(LightSet, ShapeOfASpotCountsTheRimOfTheRegion) {
   // A light was never chosen for a texel whose nearer half its cone lit: the cone was widened by atan(r/d), not asin.
   SceneBuilder builder;
   builder.AddQuad({0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {.lightmapped = false});
@@ -128,18 +135,18 @@ TEST(LightSet, ImportanceOfASpotCountsTheRimOfTheRegion) {
   const Lit lit(builder.Build());
   // 60 degrees off the axis, 1 m away, radius 0.5 m: points at 30 degrees (0.52 rad) are in it, those of 36.9 are not.
   const Vec3f light = lit.lights->locals()[0].position, to{std::sin(kPiF / 3), -0.5f, 0};
-  EXPECT_GT(lit.lights->Importance(0, light + to, {}, 0.5f), 0);
-  EXPECT_EQ(lit.lights->Importance(0, light + to, {}, 0.45f), 0);
+  EXPECT_GT(WeightOf(*lit.lights, 0, {light + to, {}, 0.5f}), 0);
+  EXPECT_EQ(WeightOf(*lit.lights, 0, {light + to, {}, 0.45f}), 0);
 }
 
-TEST(LightSet, ImportanceOfAGrazingLightIsPositive) {
+TEST(LightSet, ShapeOfAGrazingLightHasAWeight) {
   SceneBuilder builder;
   builder.AddQuad({0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {.lightmapped = false});
   builder.AddPointLight({50, 0.001, 0.5}, {1, 1, 1});
   const Lit lit(builder.Build());
   const Vec3f position = Vec3f{0.5f, 0, 0.5f} - ToFloat(lit.scene.origin_ws);
-  EXPECT_GT(lit.lights->Importance(0, position, {0, 1, 0}, 0.1f), 0);
-  EXPECT_EQ(lit.lights->Importance(0, position, {0, -1, 0}, 1e-5f), 0);
+  EXPECT_GT(WeightOf(*lit.lights, 0, {position, {0, 1, 0}, 0.1f}), 0);
+  EXPECT_EQ(WeightOf(*lit.lights, 0, {position, {0, -1, 0}, 1e-5f}), 0);
 }
 
 TEST(LightSet, PowerIsTheIntegralOfIntensity) {

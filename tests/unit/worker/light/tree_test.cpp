@@ -32,7 +32,7 @@ Scene Lights(int count, uint32_t seed) {
   return builder.Build();
 }
 
-LightTree::Place RandomPlace(TestRandom& random) { return {random.InCube(6), random.Direction()}; }
+LitPlace RandomPlace(TestRandom& random) { return {random.InCube(6), random.Direction()}; }
 
 // Mean unoccluded irradiance (luminance) of a light, over 64 of its points.
 double IrradianceOf(const LightSet& lights, int light, Vec3f position, Vec3f normal, TestRandom& random) {
@@ -52,7 +52,7 @@ TEST(LightTree, WhatIsCulledBringsNoPointMoreThanIsDispensable) {
     const Lit lit(Lights(200, 40 + scene));
     const LightTree tree(*lit.lights);
     for (int k = 0; k < 30; ++k) {
-      const LightTree::Place place{random.InCube(12), {}, random.Between(0.01f, 2)};
+      const LitPlace place{random.InCube(12), {}, random.Between(0.01f, 2)};
       const float dispensable = std::exp2(random.Between(-8, 2));
       const std::vector<int> cut = tree.Cut(place, 64), kept = tree.Cull(cut, place, dispensable);
       std::set<int> culled;
@@ -80,7 +80,7 @@ TEST(LightTree, WhatIsCulledBringsNoPointMoreThanIsDispensable) {
 TEST(LightTree, NothingIsCulledWhereNothingIsDispensable) {
   const Lit lit(Lights(100, 3));
   const LightTree tree(*lit.lights);
-  const LightTree::Place place{{1, 2, 3}, {}, 1};
+  const LitPlace place{{1, 2, 3}, {}, 1};
   const std::vector<int> cut = tree.Cut(place, 64);
   EXPECT_EQ(tree.Cull(cut, place, -1), cut);
 }
@@ -91,7 +91,7 @@ TEST(LightTree, NoLightThatBringsLightIsLeftOut) {
   TestRandom random(2);
   int bright = 0;
   for (int i = 0; i < 400; ++i) {
-    const LightTree::Place place = RandomPlace(random);
+    const LitPlace place = RandomPlace(random);
     for (int light = 0; light < lit.lights->local_count(); ++light) {
       const LightSample sample = lit.lights->SampleLocal(light, place.position, random.Square());
       if (MaxComponent(sample.perpendicular) <= 0 || Dot(sample.dir, place.normal) <= 1e-5f) continue;
@@ -107,7 +107,7 @@ TEST(LightTree, DrawsWithTheProbabilityThatItSays) {
   const LightTree tree(*lit.lights);
   TestRandom random(4);
   for (int i = 0; i < 5; ++i) {
-    const LightTree::Place place = RandomPlace(random);
+    const LitPlace place = RandomPlace(random);
     constexpr int kDraws = 40000;
     std::vector<double> counts(static_cast<size_t>(lit.lights->local_count()), 0.0);
     for (int k = 0; k < kDraws; ++k) {
@@ -149,7 +149,7 @@ TEST(LightTree, IsQuieterThanAChoiceByFlux) {
   TestRandom random(7);
   double by_tree = 0, by_flux = 0;
   for (int i = 0; i < 50; ++i) {
-    const LightTree::Place place = RandomPlace(random);
+    const LitPlace place = RandomPlace(random);
     double mean = 0, square_tree = 0, square_flux = 0;
     for (int light = 0; light < lit.lights->local_count(); ++light) {
       const LightSample sample = lit.lights->SampleLocal(light, place.position, {0.3f, 0.6f});
