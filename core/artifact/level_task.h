@@ -28,7 +28,7 @@ inline constexpr KindName kChart{"chart/layout", 2};
 inline constexpr KindName kSurvey{"texel/survey", 11};
 inline constexpr KindName kEmit{"photon/emit", 10};
 inline constexpr KindName kDensity{"photon/density", 7};
-inline constexpr KindName kGather{"gather/tiles", 27};
+inline constexpr KindName kGather{"gather/tiles", 28};
 inline constexpr KindName kFinish{"finish/page", 15};
 inline constexpr KindName kReport{"finish/report", 5};
 inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};

@@ -238,6 +238,32 @@ TEST(DirectLight, OneOfManyThroughASlitIsNotMissed) {
   EXPECT_NEAR(sum / expected, 1, 0.03);
 }
 
+// Symptom: where a gather ray met something near, the lamp that lights it was drawn from all lamps by how bright they
+// would be, and one far brighter behind a wall took nearly every sample.
+TEST(DirectLight, ALampBehindAWallDoesNotTakeTheSamplesOfADimRoom) {
+  // Variance of the room's light, over the square of its mean.
+  const auto noise = [](float outside) {
+    SceneBuilder builder({kPage, kPage});
+    builder.AddRoom({0, 0, 0}, {3, 2.5, 3}, {.lightmapped = false});
+    builder.AddBox({1, 0, 1}, {2, 1, 2}, {.page = {0, 0, kPage, kPage}});
+    builder.AddPointLight({0.6, 2, 1.5}, {1, 1, 1});
+    builder.AddPointLight({2.4, 2, 1.5}, {1, 1, 1});
+    builder.AddPointLight({4, 1, 1.5}, {outside, outside, outside});
+    BakeSettings settings;
+    settings.min_samples = settings.max_samples = 64;
+    settings.photons = 1'000'000;
+    double variance = 0, sum = 0;
+    const BakedScene result = BakeSceneInMemory(builder.Build(), settings);
+    for (const TexelLight& light : result.lights()) {
+      variance += static_cast<double>(light.indirect.variance.y);
+      sum += static_cast<double>(light.irradiance.y);
+    }
+    return variance / (sum * sum);
+  };
+  // 8 times; 58 where it does.
+  EXPECT_LT(noise(3000), 15 * noise(0));
+}
+
 TEST(DirectLight, DiscFollowsItsClosedForm) {
   SceneBuilder builder = Floor();
   const int emitter = builder.AddMaterial({0, 0, 0}, {4, 4, 4});

@@ -12,7 +12,9 @@ namespace bakewell {
 namespace {
 
 constexpr uint32_t kProbesPerNode = 8;
-constexpr float kUnseenShare = 0.05f;  // a light that no probe saw keeps this share of its importance
+constexpr float kUnseenShare = 0.05f;  // of a light that no probe saw is taken to be visible
+constexpr double kMostUnseen = 4;      // light, over that of lights that were seen
+constexpr float kLeastHeld = 1e-6f;    // share of such light that is left
 
 // A sphere around the texels' centres.
 LitPlace Around(std::span<const Texel> texels) {
@@ -35,7 +37,6 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
   const std::vector<int> cut = scene.tree.Cut(place, LightPack::kMost);
   const std::vector<int> kept = scene.tree.Cull(cut, place, dispensable);
   SkipCount& culled = counters.skip[Skip::kCulledLights];
-  std::vector<LightShape> shapes;
   for (size_t i = 0, k = 0; i < cut.size(); ++i) {
     const int node = cut[i];
     const bool keep = k < kept.size() && kept[k] == node;
@@ -51,10 +52,25 @@ TileLights::TileLights(const GatherScene& scene, const TexelMap& map, uint32_t b
     } else {
       cut_.push_back(all < 2 ? Node{node} : Probe(node, texels, map, key, counters));
     }
-    shapes.push_back(scene.tree.ShapeOf(node));
-    shapes.back().intensity *= cut_.back().visibility;
+  }
+  HoldBackUnseen(place);
+  std::vector<LightShape> shapes;
+  for (const Node& node : cut_) {
+    shapes.push_back(scene.tree.ShapeOf(node.node));
+    shapes.back().intensity *= node.visibility;
   }
   pack_ = LightPack(shapes);
+}
+
+// A few lamps in a room below a stadium's: those that no probe saw must not take all samples.
+void TileLights::HoldBackUnseen(const LitPlace& place) {
+  double seen = 0, unseen = 0;
+  for (const Node& node : cut_) {
+    (node.seen ? seen : unseen) += static_cast<double>(scene_.tree.Importance(node.node, place) * node.visibility);
+  }
+  if (!(seen > 0 && unseen > kMostUnseen * seen)) return;
+  const float share = std::max(kLeastHeld, static_cast<float>(kMostUnseen * seen / unseen));
+  for (Node& node : cut_) node.visibility *= node.seen ? 1 : share;
 }
 
 TileLights::Node TileLights::Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,

@@ -47,6 +47,8 @@ class TileLights {
   Node Probe(int node, std::span<const Texel> texels, const TexelMap& map, uint32_t key,
              GatherCounters& counters) const;
 
+  void HoldBackUnseen(const LitPlace& place);
+
   const GatherScene& scene_;
   std::vector<Node> cut_;          // at most LightPack::kMost
   LightPack pack_;                 // of the cut, as much of them as is visible
