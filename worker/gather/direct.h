@@ -40,7 +40,7 @@ class TileLights {
   struct Node {
     int node = 0;  // of the tree
     bool kept = true;
-    bool seen = true;      // by a probe, or there is nothing to choose from
+    bool seen = true;      // by a probe, or it was not probed: there is no other, or it is too weak
     float visibility = 1;  // (0, 1]
   };
   // With the share of a few probes from the tile's texels that see the node; 1 where none could tell.

@@ -103,10 +103,11 @@ TEST(LightTree, NoLightThatBringsLightIsLeftOut) {
 }
 
 TEST(LightTree, DrawsWithTheProbabilityThatItSays) {
-  const Lit lit(Lights(60, 3));
-  const LightTree tree(*lit.lights);
-  TestRandom random(4);
-  for (int i = 0; i < 5; ++i) {
+  // Few enough to be weighed all at once, and so many that halves are chosen first.
+  for (int i = 0; i < 6; ++i) {
+    const Lit lit(Lights(i % 2 == 0 ? 60 : 900, 3));
+    const LightTree tree(*lit.lights);
+    TestRandom random(4 + static_cast<uint32_t>(i));
     const LitPlace place = RandomPlace(random);
     constexpr int kDraws = 40000;
     std::vector<double> counts(static_cast<size_t>(lit.lights->local_count()), 0.0);
