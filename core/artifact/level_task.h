@@ -25,9 +25,9 @@ struct KindName {
   uint32_t code_version;
 };
 inline constexpr KindName kChart{"chart/layout", 2};
-inline constexpr KindName kSurvey{"texel/survey", 11};
-inline constexpr KindName kEmit{"photon/emit", 10};
-inline constexpr KindName kDensity{"photon/density", 7};
+inline constexpr KindName kSurvey{"texel/survey", 12};
+inline constexpr KindName kEmit{"photon/emit", 11};
+inline constexpr KindName kDensity{"photon/density", 8};
 inline constexpr KindName kGather{"gather/tiles", 28};
 inline constexpr KindName kFinish{"finish/page", 15};
 inline constexpr KindName kReport{"finish/report", 5};

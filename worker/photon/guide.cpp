@@ -12,6 +12,9 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int kMaxWalk = 5;
+constexpr int kPhotonsPerWalk = 2;
+constexpr int kCoarse = 4;            // bins a side of a block
+constexpr float kCoarseShare = 0.3f;  // of the sky's marks, by blocks: each of its directions has few
 
 int Bin(float unit, int grid) {
   return std::clamp(static_cast<int>((unit * 0.5f + 0.5f) * static_cast<float>(grid)), 0, grid - 1);
@@ -35,6 +38,21 @@ std::vector<float> Widen(std::span<const float> bins, int grid) {
   return wide;
 }
 
+// Marks shared out among the bins of each block, and of the blocks beside it: what few marks can tell.
+std::vector<float> Coarse(std::span<const float> bins, int grid) {
+  const int blocks = grid / kCoarse;
+  std::vector<float> sums(static_cast<size_t>(blocks * blocks), 0.0f), coarse(bins.size());
+  const auto block_of = [&](int x, int y) { return static_cast<size_t>(y / kCoarse * blocks + x / kCoarse); };
+  for (int y = 0; y < grid; ++y) {
+    for (int x = 0; x < grid; ++x) sums[block_of(x, y)] += bins[static_cast<size_t>(y * grid + x)];
+  }
+  const std::vector<float> wide = Widen(sums, blocks);
+  for (int y = 0; y < grid; ++y) {
+    for (int x = 0; x < grid; ++x) coarse[static_cast<size_t>(y * grid + x)] = wide[block_of(x, y)];
+  }
+  return coarse;
+}
+
 // A density that is `share` uniform and otherwise follows sqrt of the marks (between flat over what is lit and in
 // proportion to it). Uniform where nothing was marked.
 std::vector<float> Mix(const std::vector<float>& marks, float share) {
@@ -48,10 +66,12 @@ std::vector<float> Mix(const std::vector<float>& marks, float share) {
   return density;
 }
 
+// Over how much of the square the marks are spread (their participation ratio): k of n bins that are marked alike give
+// k / n, however many marks there are.
 float UsefulShare(const std::vector<float>& marks) {
-  size_t used = 0;
-  for (const float m : marks) used += m > 0 ? 1 : 0;
-  return std::max(static_cast<float>(used) / static_cast<float>(marks.size()), 1e-3f);
+  double sum = 0, roots = 0;
+  for (const float m : marks) sum += static_cast<double>(m), roots += std::sqrt(static_cast<double>(m));
+  return std::max(sum > 0 ? static_cast<float>(roots * roots / (sum * static_cast<double>(marks.size()))) : 0, 1e-3f);
 }
 
 }  // namespace
@@ -114,7 +134,7 @@ EmissionGuide::Start EmissionGuide::StartOf(int walk, size_t texels, uint32_t se
 int EmissionGuide::WalksFor(const LightSet& lights, int64_t photons) {
   // Without sun and sky they have little to find out.
   const bool distant = !lights.directionals().empty() || lights.environment().bright();
-  return static_cast<int>(std::min<int64_t>(photons / 16, distant ? 100'000 : 20'000));
+  return static_cast<int>(std::min<int64_t>(photons / kPhotonsPerWalk, distant ? 100'000 : 20'000));
 }
 
 std::vector<TexelPoint> EmissionGuide::StartsIn(const World& world, const AtlasLayout& layout, const TexelMap& map,
@@ -199,8 +219,11 @@ void EmissionGuide::FinishSky(const EnvironmentLight& sky, const Marks& marks) {
   constexpr size_t kBins = static_cast<size_t>(kSkyColumns) * kSkyRows;
   std::vector<float> useful(kBins);
   for (size_t bin = 0; bin < kBins; ++bin) {
-    const std::vector<float> wide = Widen(std::span(marks.sky).subspan(bin * kPerBin, kPerBin), kSkyGrid);
-    sky_position_.emplace_back(kSkyGrid, kSkyGrid, Mix(wide, kUniformShare));
+    const std::span<const float> here = std::span(marks.sky).subspan(bin * kPerBin, kPerBin);
+    const std::vector<float> wide = Widen(here, kSkyGrid), coarse = Mix(Coarse(here, kSkyGrid), kUniformShare);
+    std::vector<float> density = Mix(wide, kUniformShare);
+    for (size_t i = 0; i < kPerBin; ++i) density[i] += kCoarseShare * (coarse[i] - density[i]);
+    sky_position_.emplace_back(kSkyGrid, kSkyGrid, density);
     useful[bin] = UsefulShare(wide);
   }
   std::vector<float> weights;
