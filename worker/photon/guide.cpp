@@ -134,7 +134,8 @@ EmissionGuide::Start EmissionGuide::StartOf(int walk, size_t texels, uint32_t se
 int EmissionGuide::WalksFor(const LightSet& lights, int64_t photons) {
   // Without sun and sky they have little to find out.
   const bool distant = !lights.directionals().empty() || lights.environment().bright();
-  return static_cast<int>(std::min<int64_t>(photons / kPhotonsPerWalk, distant ? 100'000 : 20'000));
+  return static_cast<int>(distant ? std::min<int64_t>(photons / kPhotonsPerWalk, 100'000)
+                                  : std::min<int64_t>(photons / 16, 20'000));
 }
 
 std::vector<TexelPoint> EmissionGuide::StartsIn(const World& world, const AtlasLayout& layout, const TexelMap& map,

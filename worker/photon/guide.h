@@ -14,7 +14,8 @@ namespace bakewell {
 // scene's bounding sphere, across its direction; most of it would end on roofs that no texel sees. A pilot walks from
 // texels into the scene (importance runs backwards, Peter & Pietrek 1998) and, at every surface that a texel sees,
 // marks from which part of the square, and for the sky from which direction, light arrives. Emission follows the marks,
-// widened by one bin, with a share kept uniform, so that nothing is ever missed: the estimate stays unbiased.
+// widened by one bin, the sky's in part by blocks of bins, with a share kept uniform, so that nothing is ever missed:
+// the estimate stays unbiased.
 class EmissionGuide {
  public:
   static constexpr int kSunGrid = 64, kSkyGrid = 16, kSkyColumns = 16, kSkyRows = 8;
@@ -51,7 +52,8 @@ class EmissionGuide {
   };
   SkyPoint DrawSky(Vec2f u_direction, Vec2f u_position) const;
 
-  // Share of the square's area (sun) or of the sky's flux that reaches what texels see, (0, 1].
+  // Share of the square's area (sun) or of the sky's flux that reaches what texels see, (0, 1], by how far marks
+  // spread.
   float UsefulSun(int directional) const { return sun_useful_[directional]; }
   float UsefulSky() const { return sky_useful_; }
   // How many of the walks' rays met each triangle.
