@@ -77,7 +77,7 @@ void AddSharedFlags(CLI::App& command, BakeFlags& flags) {
                      "none, constant:R,G,B, gradient:R,G,B/R,G,B/R,G,B (zenith/horizon/ground) or FILE.exr "
                      "(latitude-longitude), instead of the scene's");
   command.add_option("--albedo-limit", flags.albedo_limit, "Largest albedo; above it is clamped (0.98)");
-  command.add_flag("--no-filter", flags.no_filter, "Leave the noise as it is (at high quality it is left)");
+  command.add_flag("--no-filter", flags.no_filter, "Leave the noise as it is");
   command.add_option("--footprint", flags.footprint, "Side of the square that a texel averages, in texels (0.5)");
   command.add_option("--seed", flags.seed, "Another seed, other noise");
   command.add_option("--threads", flags.threads, "Threads; 0: as many as the machine has")->capture_default_str();

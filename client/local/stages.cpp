@@ -81,7 +81,7 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
   });
   clock.End();
   if (progress.Cancelled()) return absl::CancelledError("cancelled");
-  if (Filters(settings)) {
+  if (settings.filter) {
     clock.Begin("filter");
     const int pages = static_cast<int>(prepared.texels.pages.size());
     for (int page = 0; page < pages; ++page) {

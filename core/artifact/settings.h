@@ -23,7 +23,7 @@ struct BakeSettings {
   int resolution = 0;          // page side in texels; 0: scene.extras.lightmap, else from texels_per_metre
   float texels_per_metre = 0;  // 0: from resolution, else 8
   float footprint = 0.5f;      // side of the square about a texel's centre that its value averages [texels], (0, 1]
-  bool filter = true;          // smooth what noise hides, below high quality
+  bool filter = true;          // smooth what noise hides
   BackfaceMode backfaces = BackfaceMode::kReflect;
   Quality quality = Quality::kMedium;
   float target_error = 0;      // relative standard error at which a texel stops; 0: the quality's

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/filter/window.h"
+#include "worker/filter/connections.h"
 
 namespace bakewell {
 namespace {

@@ -1,6 +1,6 @@
 #include "worker/filter/smooth_tile.h"
 
-#include <utility>
+#include <array>
 
 #include "worker/filter/connect.h"
 
@@ -10,12 +10,8 @@ SmoothTile::SmoothTile(const TexelMap& map, uint32_t begin, uint32_t end)
     : map_(map),
       begin_(begin),
       end_(end),
-      left_(map.texels[begin].x / kTileSide * kTileSide - SmoothGrid::kMostRadius),
-      top_(map.texels[begin].y / kTileSide * kTileSide - SmoothGrid::kMostRadius) {}
-
-SmoothTile::SmoothTile(const SmoothTile& connected, Signal signal) : SmoothTile(connected) {
-  grid_ = SmoothGrid(std::move(grid_), signal);
-}
+      left_(map.texels[begin].x / kTileSide * kTileSide),
+      top_(map.texels[begin].y / kTileSide * kTileSide) {}
 
 // -1 where there is no texel.
 int32_t SmoothTile::TexelAt(int x, int y) const {
@@ -25,65 +21,94 @@ int32_t SmoothTile::TexelAt(int x, int y) const {
   return map_.texel_at[first.page][static_cast<size_t>(y) * static_cast<size_t>(page.width) + static_cast<size_t>(x)];
 }
 
-SmoothCell& SmoothTile::CellOf(size_t i) {
-  const Texel& texel = map_.texels[begin_ + i];
-  return grid_.At(texel.x - left_, texel.y - top_);
-}
-
 std::vector<uint8_t> SmoothTile::Connect(const World& world, const std::vector<bool>& valid,
                                          const std::vector<bool>& crowded, int64_t& rays) {
   std::vector<uint8_t> open(end_ - begin_, 0);
-  for (int y = 0; y < grid_.height(); ++y) {
-    for (int x = 0; x < grid_.width(); ++x) {
-      const int32_t at = TexelAt(left_ + x, top_ + y);
+  Connections grid(kTileSide + 2 * kWindowRadius, kTileSide + 2 * kWindowRadius);
+  for (int y = 0; y < grid.height(); ++y) {
+    for (int x = 0; x < grid.width(); ++x) {
+      const int32_t at = TexelAt(left_ - kWindowRadius + x, top_ - kWindowRadius + y);
       if (at < 0) continue;
       const uint32_t texel = static_cast<uint32_t>(at);
       if (!IsMine(texel)) {
-        ConnectCell(x, y, texel, valid, 0xf);
+        ConnectCell(x, y, texel, valid, 0xf, grid);
       } else if (valid[texel - begin_]) {
         open[texel - begin_] = ConnectTexel(world, map_, texel, crowded[texel - begin_], rays);
-        ConnectCell(x, y, texel, valid, open[texel - begin_]);
+        ConnectCell(x, y, texel, valid, open[texel - begin_], grid);
       }
     }
   }
-  grid_.MeasureRoom();
+  grid.Finish();
+  Locate(valid, grid);
   return open;
 }
 
-void SmoothTile::ConnectCell(int x, int y, uint32_t texel, const std::vector<bool>& valid, uint8_t open) {
+void SmoothTile::ConnectCell(int x, int y, uint32_t texel, const std::vector<bool>& valid, uint8_t open,
+                             Connections& grid) const {
+  const Texel& from = map_.texels[texel];
   for (int k = 0; k < 4; ++k) {
-    const int32_t at = TexelAt(left_ + x + kNeighbours[k][0], top_ + y + kNeighbours[k][1]);
-    if (at < 0 || map_.texels[at].chart != map_.texels[texel].chart) continue;
+    const int32_t at = TexelAt(from.x + kNeighbours[k][0], from.y + kNeighbours[k][1]);
+    if (at < 0 || map_.texels[at].chart != from.chart) continue;
     const uint32_t other = static_cast<uint32_t>(at);
     if (IsMine(other) && !valid[other - begin_]) continue;
-    if (open >> k & 1) grid_.Connect(x, y, k);
+    if (open >> k & 1) grid.Connect(x, y, k);
   }
 }
 
-void SmoothTile::Put(size_t i, float value, float variance) {
-  SmoothCell& cell = CellOf(i);
-  cell.known = true;
-  cell.value = value;
-  cell.variance = variance;
-}
-
-template <typename Visit>
-void SmoothTile::ForEachKnown(Visit visit) {
-  for (size_t i = 0; i < end_ - begin_; ++i) {
-    const Texel& texel = map_.texels[begin_ + i];
-    if (CellOf(i).known) visit(i, texel.x - left_, texel.y - top_);
+void SmoothTile::Locate(const std::vector<bool>& valid, const Connections& grid) {
+  std::array<bool, (kTileSide + 2 * kWindowRadius) * (kTileSide + 2 * kWindowRadius)> known{};
+  const auto known_at = [&](int x, int y) -> bool& {
+    return known[static_cast<size_t>((y + kWindowRadius) * (kTileSide + 2 * kWindowRadius) + x + kWindowRadius)];
+  };
+  places_.resize(end_ - begin_);
+  for (size_t i = 0; i < places_.size(); ++i) {
+    if (!valid[i]) continue;
+    Place& place = places_[i];
+    place.x = map_.texels[begin_ + i].x - left_;
+    place.y = map_.texels[begin_ + i].y - top_;
+    place.part = grid.PartOf(place.x + kWindowRadius, place.y + kWindowRadius);
+    place.open = grid.IsOpen(place.x + kWindowRadius, place.y + kWindowRadius);
+    place.reach = grid.Reach(place.x + kWindowRadius, place.y + kWindowRadius);
+    known_at(place.x, place.y) = true;
+  }
+  for (Place& place : places_) {
+    if (place.part == 0) continue;
+    float all = 0, here = 0;
+    for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
+      for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
+        if (!place.reach[WindowIndex(dx, dy)]) continue;
+        all += SimilarTexels::Nearness(dx, dy);
+        here += known_at(place.x + dx, place.y + dy) ? SimilarTexels::Nearness(dx, dy) : 0;
+      }
+    }
+    place.known = here / all;
   }
 }
 
-std::vector<SmoothGrid::Smoothed> SmoothTile::Smooth() {
-  std::vector<SmoothGrid::Smoothed> result(end_ - begin_);
-  std::vector<SmoothGrid::Calm> calm(result.size());
-  ForEachKnown([&](size_t i, int x, int y) { calm[i] = grid_.Calmed(x, y); });
-  ForEachKnown([&](size_t i, int x, int y) { grid_.Take(x, y, calm[i]); });
-  std::vector<SmoothGrid::Steps> steps(result.size());
-  ForEachKnown([&](size_t i, int x, int y) { CellOf(i).radius = grid_.Choose(x, y, &steps[i]); });
-  ForEachKnown([&](size_t i, int x, int y) { result[i] = grid_.SmoothedAt(x, y, grid_.Agree(x, y), steps[i]); });
-  return result;
+std::vector<SimilarTexels::Mean> SmoothTile::Smooth(const std::vector<float>& value, const std::vector<float>& variance,
+                                                    float margin) const {
+  thread_local SimilarTexels texels(kTileSide, kTileSide);
+  texels.Clear();
+  for (size_t i = 0; i < places_.size(); ++i) {
+    if (places_[i].part != 0) texels.Put(places_[i].x, places_[i].y, value[i], variance[i], places_[i].part);
+  }
+  texels.Compare(false);
+  for (const Place& place : places_) {
+    if (place.part != 0 && !place.open) texels.Restrict(place.x, place.y, place.reach);
+  }
+  texels.Regress();
+  std::vector<SimilarTexels::Mean> means(places_.size());
+  for (size_t i = 0; i < places_.size(); ++i) {
+    const Place& place = places_[i];
+    if (place.part == 0) {
+      means[i] = {value[i], 1, 1, variance[i]};
+      continue;
+    }
+    means[i] = texels.MeanOf(place.x, place.y, margin);
+    means[i].variance *= place.known;
+    means[i].square *= place.known;
+  }
+  return means;
 }
 
 }  // namespace bakewell

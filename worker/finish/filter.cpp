@@ -10,41 +10,44 @@
 #include <numeric>
 #include <utility>
 
-#include "worker/filter/window.h"
+#include "worker/filter/similarity.h"
 #include "worker/gather/noise.h"
 
 namespace bakewell {
 namespace {
 
+enum class Signal : uint8_t { kIndirect, kDirect };
+
+constexpr int kBlock = 32;  // texels a side that are weighed at a time
+
 class PageFilter {
  public:
   PageFilter(const TexelMap& map, int page, std::span<TexelLight> lights)
-      : map_(map), page_(page), lights_(lights), grid_(map.pages[page].width, map.pages[page].height, Signal::kDirect) {
+      : map_(map), page_(page), lights_(lights), connections_(map.pages[page].width, map.pages[page].height) {
     for (const int32_t at : map.texel_at[page]) {
-      if (at < 0) continue;
-      texels_.push_back(static_cast<uint32_t>(at));
-      Connect(texels_.back());
+      if (at >= 0) Connect(static_cast<uint32_t>(at));
     }
-    grid_.MeasureRoom();
+    connections_.Finish();
+    for (int top = 0; top < connections_.height(); top += kBlock) {
+      for (int left = 0; left < connections_.width(); left += kBlock) AddBlock(left, top);
+    }
   }
 
   // Returns what is to be added to FilterCounters::bias_square.
   double Run(Signal signal, std::vector<bool>& filtered) {
     signal_ = signal;
-    grid_ = SmoothGrid(std::move(grid_), signal);
-    for (const uint32_t i : texels_) Put(i);
-    std::vector<SmoothGrid::Calm> calm(texels_.size());
-    ForEach([&](size_t k, const Texel& texel) { calm[k] = grid_.Calmed(texel.x, texel.y); });
-    ForEach([&](size_t k, const Texel& texel) { grid_.Take(texel.x, texel.y, calm[k]); });
-    ForEach([&](size_t, const Texel& texel) {
-      SmoothCell& cell = grid_.At(texel.x, texel.y);
-      if (cell.known) cell.radius = grid_.Choose(texel.x, texel.y);
-    });
     std::vector<LightPart> smooth(texels_.size());
     std::vector<uint8_t> changed(texels_.size(), 0);
     std::vector<double> bias_square(texels_.size(), 0);
-    ForEach([&](size_t k, const Texel& texel) { changed[k] = Smooth(texel, smooth[k], bias_square[k]) ? 1 : 0; });
-    KeepFlux(changed, smooth);
+    tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) {
+      const Block& block = blocks_[b];
+      thread_local SimilarTexels weights(kBlock, kBlock);
+      if (!Weigh(block, weights)) return;
+      for (size_t k = block.begin; k < block.end; ++k) {
+        changed[k] = Smooth(block, map_.texels[texels_[k]], weights, smooth[k], bias_square[k]) ? 1 : 0;
+      }
+    });
+    Settle(changed, bias_square, smooth);
     for (size_t k = 0; k < texels_.size(); ++k) {
       if (changed[k] == 0) continue;
       Replace(lights_[texels_[k]], smooth[k]);
@@ -54,16 +57,54 @@ class PageFilter {
   }
 
  private:
-  template <typename Visit>
-  void ForEach(Visit visit) {
-    tbb::parallel_for(size_t{0}, texels_.size(), [&](size_t k) { visit(k, map_.texels[texels_[k]]); });
+  struct Block {
+    int left = 0, top = 0;
+    size_t begin = 0, end = 0;  // of texels_
+  };
+
+  void AddBlock(int left, int top) {
+    Block block{left, top, texels_.size(), 0};
+    for (int y = top; y < std::min(top + kBlock, connections_.height()); ++y) {
+      for (int x = left; x < std::min(left + kBlock, connections_.width()); ++x) {
+        if (connections_.PartOf(x, y) != 0) texels_.push_back(static_cast<uint32_t>(TexelAt(x, y)));
+      }
+    }
+    block.end = texels_.size();
+    if (block.begin < block.end) blocks_.push_back(block);
   }
 
-  const TexelLight* LightAt(int x, int y) const {
-    const size_t at = static_cast<size_t>(y) * static_cast<size_t>(grid_.width()) + static_cast<size_t>(x);
-    const int32_t i = map_.texel_at[page_][at];
-    return i < 0 ? nullptr : &lights_[i];
+  // The weights of a block's texels. False where nothing is noisy.
+  bool Weigh(const Block& block, SimilarTexels& weights) const {
+    weights.Clear();
+    bool noisy = false;
+    constexpr int kHalo = SimilarTexels::kHalo;
+    for (int y = -kHalo; y < kBlock + kHalo; ++y) {
+      for (int x = -kHalo; x < kBlock + kHalo; ++x) {
+        if (!connections_.Contains(block.left + x, block.top + y)) continue;
+        const uint8_t part = connections_.PartOf(block.left + x, block.top + y);
+        if (part == 0) continue;
+        const TexelLight& light = LightAt(block.left + x, block.top + y);
+        const float variance = Luminance(VarianceOf(light));
+        noisy |= variance > 0;
+        weights.Put(x, y, ValueOf(light), variance, part);
+      }
+    }
+    if (!noisy) return false;
+    weights.Compare(true);
+    for (size_t k = block.begin; k < block.end; ++k) {
+      const Texel& texel = map_.texels[texels_[k]];
+      if (connections_.IsOpen(texel.x, texel.y)) continue;
+      weights.Restrict(texel.x - block.left, texel.y - block.top, connections_.Reach(texel.x, texel.y));
+    }
+    weights.Regress();
+    return true;
   }
+
+  int32_t TexelAt(int x, int y) const {
+    return map_
+        .texel_at[page_][static_cast<size_t>(y) * static_cast<size_t>(connections_.width()) + static_cast<size_t>(x)];
+  }
+  const TexelLight& LightAt(int x, int y) const { return lights_[TexelAt(x, y)]; }
 
   // Luminance of the part that is filtered.
   float ValueOf(const TexelLight& light) const {
@@ -75,23 +116,16 @@ class PageFilter {
     return signal_ == Signal::kIndirect ? light.indirect.variance : light.direct_variance;
   }
 
-  void Put(uint32_t i) {
-    const TexelLight& light = lights_[i];
-    if (!light.valid) return;
-    SmoothCell& cell = grid_.At(map_.texels[i].x, map_.texels[i].y);
-    cell.known = true;
-    cell.value = ValueOf(light);
-    cell.variance = Luminance(VarianceOf(light));
-  }
-
   void Connect(uint32_t i) {
     const Texel& texel = map_.texels[i];
     const TexelLight& light = lights_[i];
     if (!light.valid) return;
     for (int k = 0; k < 4; ++k) {
       if (!(light.open >> k & 1)) continue;
-      const TexelLight* other = LightAt(texel.x + kNeighbours[k][0], texel.y + kNeighbours[k][1]);
-      if (other != nullptr && other->valid) grid_.Connect(texel.x, texel.y, k);
+      const int x = texel.x + kNeighbours[k][0], y = texel.y + kNeighbours[k][1];
+      if (!connections_.Contains(x, y)) continue;
+      const int32_t other = TexelAt(x, y);
+      if (other >= 0 && lights_[other].valid) connections_.Connect(texel.x, texel.y, k);
     }
   }
 
@@ -106,41 +140,37 @@ class PageFilter {
     for (size_t k = 0; k < kWide; ++k) sum[k] += numbers[k] * weight;
   }
 
-  bool Smooth(const Texel& texel, LightPart& result, double& bias_square) const {
-    if (!grid_.At(texel.x, texel.y).known) return false;
-    const float agreed = grid_.Agree(texel.x, texel.y);
-    if (agreed == 0) return false;
-    const SmoothGrid::Window window = grid_.WindowOf(texel.x, texel.y, agreed);
-    const int radius = window.radius;
-    if (radius == 0) return false;
+  bool Smooth(const Block& block, const Texel& texel, const SimilarTexels& weights, LightPart& result,
+              double& bias_square) const {
+    const int x = texel.x - block.left, y = texel.y - block.top;
+    const float own_weight = weights.Weight(x, y, 0, 0);
+    if (own_weight == 1) return false;
     Numbers sum{};
     Rgb variance;
-    for (int dy = -radius; dy <= radius; ++dy) {
-      for (int dx = -radius; dx <= radius; ++dx) {
-        const float weight = window.At(dx, dy);
+    for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
+      for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
+        const float weight = weights.Weight(x, y, dx, dy);
         if (weight == 0) continue;
-        const TexelLight& light = *LightAt(texel.x + dx, texel.y + dy);
+        const TexelLight& light = LightAt(texel.x + dx, texel.y + dy);
         if (signal_ == Signal::kDirect) AddWeighted(&light.irradiance.x, weight, sum);
         AddWeighted(&light.indirect.irradiance.x, signal_ == Signal::kDirect ? -weight : weight, sum);
         variance += VarianceOf(light) * (weight * weight);
       }
     }
     result = std::bit_cast<LightPart>(sum);
-    result.variance = variance;
-    if (std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) < 0) return false;
-    // Without bias the texel would move by as much as its noise and the window's, which share its own weight.
-    const TexelLight& own = *LightAt(texel.x, texel.y);
-    const float moved = Luminance(result.irradiance) - ValueOf(own);
-    const float noise = Luminance(VarianceOf(own)) * (1 - 2 * window.At(0, 0)) + Luminance(variance);
-    bias_square =
-        static_cast<double>(moved) * static_cast<double>(moved) - static_cast<double>(noise) / SetNoise::kMargin;
-    return true;
+    const SimilarTexels::Mean mean = weights.MeanOf(x, y, static_cast<float>(SetNoise::kMargin));
+    const float chosen = mean.follows * mean.follows - own_weight * own_weight;  // the weights' part
+    result.variance = variance + VarianceOf(LightAt(texel.x, texel.y)) * chosen;
+    bias_square = static_cast<double>(mean.bias_square);
+    return std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) >= 0;
   }
 
-  // Windows that avoid a bright stray lose its light: each chart's sum is brought back to what it was.
-  void KeepFlux(const std::vector<uint8_t>& changed, std::vector<LightPart>& smooth) const {
+  // By charts: windows that avoid a bright stray lose its light, so the sum is brought back to what it was; and what
+  // they blur is counted as variance, where texels that are alike say it together.
+  void Settle(const std::vector<uint8_t>& changed, const std::vector<double>& bias_square,
+              std::vector<LightPart>& smooth) const {
     struct Sum {
-      double before = 0, after = 0;
+      double before = 0, after = 0, variance = 0, bias_square = 0;
     };
     std::map<int32_t, Sum> charts;
     for (size_t k = 0; k < texels_.size(); ++k) {
@@ -148,10 +178,15 @@ class PageFilter {
       Sum& sum = charts[map_.texels[texels_[k]].chart];
       sum.before += static_cast<double>(ValueOf(lights_[texels_[k]]));
       sum.after += static_cast<double>(Luminance(smooth[k].irradiance));
+      sum.variance += static_cast<double>(Luminance(smooth[k].variance));
+      sum.bias_square += bias_square[k];
     }
     for (size_t k = 0; k < texels_.size(); ++k) {
       if (changed[k] == 0) continue;
       const Sum& sum = charts[map_.texels[texels_[k]].chart];
+      if (sum.variance > 0 && sum.bias_square > 0) {
+        smooth[k].variance = smooth[k].variance * static_cast<float>(1 + sum.bias_square / sum.variance);
+      }
       if (!(sum.after > 0)) continue;
       const float scale = static_cast<float>(sum.before / sum.after);
       smooth[k].irradiance = smooth[k].irradiance * scale;
@@ -179,8 +214,9 @@ class PageFilter {
   const int page_;
   Signal signal_ = Signal::kDirect;
   const std::span<TexelLight> lights_;
-  SmoothGrid grid_;
-  std::vector<uint32_t> texels_;
+  Connections connections_;
+  std::vector<Block> blocks_;
+  std::vector<uint32_t> texels_;  // connected ones, block by block
 };
 
 }  // namespace

@@ -14,10 +14,10 @@ struct FilterCounters {
   double bias_square = 0;
 };
 
-// Smooths the direct and the indirect light of one page's texels, each by windows of its own (worker/filter/window.h),
-// never with invalid ones; elements as in TexelMap::texels, of which those of other pages are left alone. Irradiance
-// and all SH coefficients get the same weights, and every chart keeps its sum, so that what is smoothed away is not
-// lost.
+// Smooths the direct and the indirect light of one page's texels, each by weights of its own
+// (worker/filter/similarity.h), never with invalid ones; elements as in TexelMap::texels, of which those of other pages
+// are left alone. Irradiance and all SH coefficients get the same weights, and every chart keeps its sum, so that what
+// is smoothed away is not lost.
 void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, FilterCounters& counters);
 
 }  // namespace bakewell

@@ -29,27 +29,24 @@ void TileBudget::Part::Add(Rgb irradiance, Rgb its_variance, int its_samples) {
   samples.push_back(its_samples);
 }
 
-void TileBudget::Filtered::Apply(const std::vector<TexelWork>& work, Part& part) {
+void TileBudget::Filtered::Apply(const SmoothTile& tile, const TilePool& pool, Part& part) {
   if (std::none_of(part.variance.begin(), part.variance.end(), [](float variance) { return variance > 0; })) return;
-  if (smoothed.empty() || changed > kChangedShare * static_cast<float>(work.size())) {
-    for (size_t i = 0; i < work.size(); ++i) {
-      if (work[i].valid) tile->Put(i, part.value[i], part.variance[i]);
-    }
-    smoothed = tile->Smooth();
+  if (smoothed.empty() || changed > kChangedShare * static_cast<float>(smoothed.size())) {
+    smoothed = tile.Smooth(part.value, part.variance, kMargin);
     changed = 0;
+    std::vector<float> bias;
+    for (const SimilarTexels::Mean& mean : smoothed) bias.push_back(mean.bias_square);
+    bias_square = pool.Mean(bias);
   }
-  for (size_t i = 0; i < work.size(); ++i) {
+  for (size_t i = 0; i < smoothed.size(); ++i) {
     // What the window's texels say of their variance may have missed what is rare.
     const float filtered = std::max(smoothed[i].variance, smoothed[i].square * part.pooled[i]);
-    part.pooled[i] = std::min(part.pooled[i], filtered);
+    part.pooled[i] = std::min(part.pooled[i], filtered + std::max(0.0f, bias_square[i]));
     part.value[i] = smoothed[i].value;
   }
 }
 
-void TileBudget::WillBeFiltered(SmoothTile tile) {
-  direct_.tile.emplace(tile, Signal::kDirect);
-  indirect_.tile.emplace(std::move(tile));
-}
+void TileBudget::WillBeFiltered(SmoothTile tile) { tile_.emplace(std::move(tile)); }
 
 float TileBudget::Weighing(float irradiance) const {
   const float mean = options_.mean_irradiance;
@@ -90,8 +87,8 @@ void TileBudget::Decide(std::vector<TexelWork>& all) {
   // A stray sample must not raise its own tolerance: neighbours or the smoothed light judge.
   std::vector<Claim> claims = Claims(all, direct, indirect, pool.Mean(Sum(direct.value, indirect.value)));
   if (options_.filter && options_.target_error > 0 && !IsMet(claims, valid_count)) {
-    direct_.Apply(all, direct);
-    indirect_.Apply(all, indirect);
+    direct_.Apply(*tile_, pool, direct);
+    indirect_.Apply(*tile_, pool, indirect);
     claims = Claims(all, direct, indirect, Sum(direct.value, indirect.value));
   }
   Grant(claims, valid_count, all);

@@ -37,10 +37,10 @@ class TileBudget {
   };
   // What the filter will make of a part, when it was last looked at as a whole.
   struct Filtered {
-    std::optional<SmoothTile> tile;
-    std::vector<SmoothGrid::Smoothed> smoothed;
-    float changed = 0;  // texels that went on since
-    void Apply(const std::vector<TexelWork>& work, Part& part);
+    std::vector<SimilarTexels::Mean> smoothed;
+    std::vector<float> bias_square;  // of each, by it and its neighbours
+    float changed = 0;               // texels that went on since
+    void Apply(const SmoothTile& tile, const TilePool& pool, Part& part);
   };
 
   float Weighing(float irradiance) const;
@@ -52,6 +52,7 @@ class TileBudget {
   const TexelMap& map_;
   const uint32_t begin_;
   const GatherOptions& options_;
+  std::optional<SmoothTile> tile_;
   Filtered direct_, indirect_;
 };
 

@@ -285,7 +285,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
   const size_t gathered = lights.size();
   lights.resize(texels->texels.size());
   FilterCounters filtered;
-  if (Filters(work.settings)) InArena([&] { FilterPage(*texels, page, lights, filtered); });
+  if (work.settings.filter) InArena([&] { FilterPage(*texels, page, lights, filtered); });
   if (!work.settings.no_skip.Has(Skip::kShBands)) {
     const GatherOptions asked = BudgetOf(work.settings, level->texels->texel_count()).gather;
     SkipCount dropped;

@@ -35,8 +35,6 @@ constexpr int64_t kMostPhotons = 4'000'000'000;  // their cells and the cache fi
 
 }  // namespace
 
-bool Filters(const BakeSettings& settings) { return settings.filter && settings.quality != Quality::kHigh; }
-
 DensityOptions DensityOf(const BakeSettings& settings) {
   return {.probe_unlit = settings.no_skip.Has(Skip::kUnfacedBacks)};
 }
@@ -52,7 +50,7 @@ Budget BudgetOf(const BakeSettings& settings, int64_t texels) {
   budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
   budget.gather.floor_share = FloorShare(budget.gather.target_error);
   budget.gather.seed = settings.seed;
-  budget.gather.filter = Filters(settings);
+  budget.gather.filter = settings.filter;
   budget.gather.no_skip = settings.no_skip;
   budget.least_photons = kLeastPhotons;
   budget.most_photons = std::clamp(limits.photons_per_texel * texels, kLeastPhotons, kMostPhotons);

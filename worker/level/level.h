@@ -20,10 +20,6 @@ struct Budget {
   GatherOptions gather;
   int64_t least_photons = 0, most_photons = 0;  // PhotonsFor chooses
 };
-// Whether the pages are filtered: at high quality there is little noise that a filter could take for nothing
-// (worker/filter/README.md).
-bool Filters(const BakeSettings& settings);
-
 // How the photons' density is estimated.
 DensityOptions DensityOf(const BakeSettings& settings);
 

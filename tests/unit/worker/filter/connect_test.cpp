@@ -4,7 +4,7 @@
 
 #include "tests/support/bake_scene.h"
 #include "tests/support/scene_builder.h"
-#include "worker/filter/window.h"
+#include "worker/filter/connections.h"
 
 namespace bakewell {
 namespace {

@@ -1,0 +1,90 @@
+#include "worker/filter/connections.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace bakewell {
+
+void Connections::Connect(int x, int y, int k) {
+  const int nx = x + kNeighbours[k][0], ny = y + kNeighbours[k][1];
+  if (!Contains(nx, ny)) return;
+  At(x, y).open |= static_cast<uint8_t>(1U << k);
+  At(nx, ny).open |= static_cast<uint8_t>(1U << ((k + 4) % 8));
+}
+
+void Connections::Finish() {
+  MeasureRoom();
+  NumberParts();
+}
+
+// Chebyshev distance to the nearest texel that lacks a connection, by two sweeps.
+void Connections::MeasureRoom() {
+  const auto sweep = [this](int x, int y, size_t first) {
+    Cell& cell = At(x, y);
+    if (cell.open != 0xff) {
+      cell.room = 0;
+      return;
+    }
+    for (size_t k = first; k < first + 4; ++k) {
+      const Cell& other = At(x + kNeighbours[k][0], y + kNeighbours[k][1]);
+      cell.room = std::min(cell.room, static_cast<uint8_t>(other.room + 1));
+    }
+  };
+  constexpr size_t kLater = 0, kEarlier = 4;  // of kNeighbours, in reading order
+  for (Cell& cell : cells_) cell.room = kWindowRadius;
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) sweep(x, y, kEarlier);
+  }
+  for (int y = height_; y-- > 0;) {
+    for (int x = width_; x-- > 0;) sweep(x, y, kLater);
+  }
+}
+
+void Connections::NumberParts() {
+  constexpr uint8_t kMostParts = 255;
+  uint8_t part = 0;
+  std::vector<size_t> waiting;
+  for (size_t first = 0; first < cells_.size(); ++first) {
+    if (cells_[first].part != 0 || cells_[first].open == 0) continue;
+    part = part % kMostParts + 1;
+    cells_[first].part = part;
+    waiting.push_back(first);
+    while (!waiting.empty()) {
+      const size_t at = waiting.back();
+      waiting.pop_back();
+      for (size_t k = 0; k < kNeighbours.size(); ++k) {
+        if (!(cells_[at].open >> k & 1)) continue;
+        const size_t next = at + static_cast<size_t>(kNeighbours[k][1] * width_ + kNeighbours[k][0]);
+        if (cells_[next].part != 0) continue;
+        cells_[next].part = part;
+        waiting.push_back(next);
+      }
+    }
+  }
+}
+
+WindowSet Connections::Reach(int x, int y) const {
+  WindowSet reached;
+  if (IsOpen(x, y)) return reached.set();
+  std::array<std::array<int8_t, 2>, kWindow> waiting;
+  size_t count = 0;
+  const auto reach = [&](int dx, int dy) {
+    const size_t index = WindowIndex(dx, dy);
+    if (reached[index]) return;
+    reached[index] = true;
+    waiting[count++] = {static_cast<int8_t>(dx), static_cast<int8_t>(dy)};
+  };
+  reach(0, 0);
+  while (count > 0) {
+    const auto [dx, dy] = waiting[--count];
+    const uint8_t open = At(x + dx, y + dy).open;
+    for (size_t k = 0; k < kNeighbours.size(); ++k) {
+      if (!(open >> k & 1)) continue;
+      const int nx = dx + kNeighbours[k][0], ny = dy + kNeighbours[k][1];
+      if (std::max(std::abs(nx), std::abs(ny)) <= kWindowRadius) reach(nx, ny);
+    }
+  }
+  return reached;
+}
+
+}  // namespace bakewell

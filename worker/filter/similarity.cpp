@@ -1,0 +1,224 @@
+#include "worker/filter/similarity.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/base/check.h"
+
+namespace bakewell {
+namespace {
+
+constexpr float kDeviation = 2.5f;  // of the weights by distance [texels]
+// Texels whose squared difference is on the mean as large as their noise makes it count in full; one that is by
+// kTolerance squared larger, 1 / e of that.
+constexpr float kTolerance = 0.9f;
+constexpr float kSlopeShare = 0.5f;  // of what the regression says: all of it is noisier, none of it is more biased
+constexpr float kRising = 0.6f;      // of pairs, whose weight falls where they differ more
+constexpr float kRidge = 1e-3f;      // squared texels; texels in one line give an answer too
+constexpr float kTiny = 1e-36f;      // variance of what has none
+constexpr size_t kMostRow = 64;
+
+// Weights by distance, by WindowIndex.
+const std::array<float, kWindow>& NearnessTable() {
+  static const std::array<float, kWindow> table = [] {
+    std::array<float, kWindow> t{};
+    for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
+      for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
+        t[WindowIndex(dx, dy)] = std::exp(static_cast<float>(dx * dx + dy * dy) / (-2 * kDeviation * kDeviation));
+      }
+    }
+    return t;
+  }();
+  return table;
+}
+
+float OffsetX(size_t index) { return static_cast<float>(index % kWindowSide) - kWindowRadius; }
+float OffsetY(size_t index) { return static_cast<float>(index / kWindowSide) - kWindowRadius; }
+
+}  // namespace
+
+float SimilarTexels::Nearness(int dx, int dy) { return NearnessTable()[WindowIndex(dx, dy)]; }
+
+SimilarTexels::SimilarTexels(int width, int height)
+    : width_(width),
+      height_(height),
+      stride_(static_cast<size_t>(width) + 2 * kHalo),
+      row_(static_cast<size_t>(width)),
+      plane_(row_ * static_cast<size_t>(height)),
+      weights_(kWindow * plane_) {
+  BAKEWELL_CHECK(stride_ <= kMostRow);
+  const size_t size = stride_ * (static_cast<size_t>(height) + 2 * kHalo);
+  value_.resize(size), variance_.resize(size), pooled_.resize(size), part_.resize(size);
+}
+
+void SimilarTexels::Clear() {
+  std::fill(value_.begin(), value_.end(), 0.0f);
+  std::fill(variance_.begin(), variance_.end(), 0.0f);
+  std::fill(part_.begin(), part_.end(), 0);
+}
+
+void SimilarTexels::Put(int x, int y, float value, float variance, uint8_t part) {
+  const size_t at = Place(x, y);
+  value_[at] = value;
+  variance_[at] = variance;
+  part_[at] = part;
+}
+
+// Eight blocks alone say little.
+void SimilarTexels::PoolVariances() {
+  for (int y = 1 - kHalo; y < height_ + kHalo - 1; ++y) {
+    for (int x = 1 - kHalo; x < width_ + kHalo - 1; ++x) {
+      const size_t at = Place(x, y);
+      float sum = 0, count = 0;
+      for (const size_t row : {at - stride_, at, at + stride_}) {
+        for (const size_t other : {row - 1, row, row + 1}) {
+          const bool same = part_[other] == part_[at];
+          sum += same ? variance_[other] : 0;
+          count += same ? 1.0f : 0.0f;
+        }
+      }
+      pooled_[at] = sum / count;
+    }
+  }
+}
+
+void SimilarTexels::Compare(bool around) {
+  PoolVariances();
+  if (!around) std::fill(weights_.begin(), weights_.end(), 0.0f);
+  std::fill_n(weights_.begin() + static_cast<std::ptrdiff_t>(WindowIndex(0, 0) * plane_), plane_, 1.0f);
+  for (int dy = 0; dy <= kWindowRadius; ++dy) {
+    for (int dx = dy == 0 ? 1 : -kWindowRadius; dx <= kWindowRadius; ++dx) CompareAt(dx, dy, around);
+  }
+}
+
+void SimilarTexels::Differences(int y, int dx, int dy, int first, int end, float* squares, float* counts) const {
+  std::array<float, kMostRow> square, count;
+  const size_t from = Place(first - 1, y), n = static_cast<size_t>(end - first) + 2;
+  const size_t to = Place(first - 1 + dx, y + dy);
+  const float *value = &value_[from], *other_value = &value_[to], *pooled = &pooled_[from],
+              *other_pooled = &pooled_[to];
+  const int32_t *part = &part_[from], *other_part = &part_[to];
+  for (size_t i = 0; i < n; ++i) {
+    const float d = value[i] - other_value[i];
+    const float ratio = d * d / (pooled[i] + other_pooled[i] + kTiny);
+    const bool alike = part[i] == other_part[i] && part[i] != 0;
+    square[i] = alike ? ratio : 0.0f;
+    count[i] = alike ? 1.0f : 0.0f;
+  }
+  for (size_t i = 0; i + 2 < n; ++i) {
+    squares[i] = square[i] + square[i + 1] + square[i + 2];
+    counts[i] = count[i] + count[i + 1] + count[i + 2];
+  }
+}
+
+void SimilarTexels::CompareAt(int dx, int dy, bool around) {
+  // Pairs of which one is in the block, or both.
+  const int first_x = around ? std::min(0, -dx) : std::max(0, -dx);
+  const int end_x = around ? width_ + std::max(0, -dx) : width_ - std::max(0, dx);
+  const int first_y = around ? -dy : 0, end_y = around ? height_ : height_ - dy;
+  const float nearness = Nearness(dx, dy);
+  std::array<std::array<float, kMostRow>, 3> squares, counts;
+  std::array<float, kMostRow> weight;
+  const auto n = static_cast<size_t>(std::max(0, end_x - first_x));
+  const auto slot = [](int y) { return static_cast<size_t>((y + 3 * kHalo) % 3); };
+  for (int below = first_y - 1; below <= end_y; ++below) {
+    Differences(below, dx, dy, first_x, end_x, squares[slot(below)].data(), counts[slot(below)].data());
+    const int y = below - 1;
+    if (y < first_y) continue;
+    const auto add = [&](const std::array<std::array<float, kMostRow>, 3>& rows, size_t i) {
+      return rows[slot(y - 1)][i] + rows[slot(y)][i] + rows[slot(below)][i];
+    };
+    const int32_t *part = &part_[Place(first_x, y)], *other_part = &part_[Place(first_x + dx, y + dy)];
+    for (size_t i = 0; i < n; ++i) {
+      const float square = add(squares, i), count = add(counts, i);
+      // exp(-(ratio - 1) / kTolerance^2), but for what is next to nothing.
+      const float ratio = square / std::max(count, 1.0f);
+      const float root = std::max(0.0f, 1 - std::max(0.0f, ratio - 1) * (1 / (8 * kTolerance * kTolerance)));
+      const float root2 = root * root, root4 = root2 * root2;
+      weight[i] = part[i] == other_part[i] && part[i] != 0 ? root4 * root4 * nearness : 0.0f;
+    }
+    const auto keep = [&](size_t index, int row, int shift) {
+      if (row < 0 || row >= height_) return;
+      const int begin = std::max(0, first_x + shift), end = std::min(width_, end_x + shift);
+      if (begin >= end) return;
+      std::copy_n(&weight[static_cast<size_t>(begin - shift - first_x)], end - begin,
+                  &weights_[index * plane_ + static_cast<size_t>(row) * row_ + static_cast<size_t>(begin)]);
+    };
+    keep(WindowIndex(dx, dy), y, 0);
+    keep(WindowIndex(-dx, -dy), y + dy, dx);
+  }
+}
+
+void SimilarTexels::Restrict(int x, int y, const WindowSet& reached) {
+  const size_t at = static_cast<size_t>(y) * row_ + static_cast<size_t>(x);
+  for (size_t index = 0; index < kWindow; ++index) {
+    if (!reached[index]) weights_[index * plane_ + at] = 0;
+  }
+}
+
+void SimilarTexels::Regress() {
+  std::array<float, kMostRow> n, x, y, xx, xy, yy;
+  for (size_t row = 0; row < plane_; row += row_) {
+    for (auto* sum : {&n, &x, &y, &xx, &xy, &yy}) sum->fill(0);
+    for (size_t index = 0; index < kWindow; ++index) {
+      const float dx = OffsetX(index), dy = OffsetY(index);
+      const float* weight = &weights_[index * plane_ + row];
+      for (size_t i = 0; i < row_; ++i) {
+        const float w = weight[i];
+        n[i] += w;
+        x[i] += w * dx;
+        y[i] += w * dy;
+        xx[i] += w * (dx * dx);
+        xy[i] += w * (dx * dy);
+        yy[i] += w * (dy * dy);
+      }
+    }
+    // The plane through the window's mean, at its centre: by weights that are linear in dx and dy.
+    for (size_t i = 0; i < row_; ++i) {
+      const float one = 1 / n[i], mean_x = x[i] * one, mean_y = y[i] * one;
+      const float cxx = xx[i] * one - mean_x * mean_x + kRidge, cyy = yy[i] * one - mean_y * mean_y + kRidge;
+      const float cxy = xy[i] * one - mean_x * mean_y, scale = kSlopeShare / (cxx * cyy - cxy * cxy);
+      const float gx = scale * (cyy * mean_x - cxy * mean_y), gy = scale * (cxx * mean_y - cxy * mean_x);
+      n[i] = one * (1 + gx * mean_x + gy * mean_y);
+      x[i] = -one * gx;
+      y[i] = -one * gy;
+    }
+    for (size_t index = 0; index < kWindow; ++index) {
+      const float dx = OffsetX(index), dy = OffsetY(index);
+      float* weight = &weights_[index * plane_ + row];
+      for (size_t i = 0; i < row_; ++i) weight[i] *= n[i] + x[i] * dx + y[i] * dy;
+    }
+  }
+}
+
+SimilarTexels::Mean SimilarTexels::MeanOf(int x, int y, float margin) const {
+  Mean mean;
+  const size_t at = static_cast<size_t>(y) * row_ + static_cast<size_t>(x), center = Place(x, y);
+  const float value = value_[center], variance = pooled_[center];
+  float rise = 0, rise_value = 0;
+  for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
+    const size_t from = Place(x - kWindowRadius, y + dy), index = WindowIndex(-kWindowRadius, dy);
+    for (size_t i = 0; i < kWindowSide; ++i) {
+      const float weight = weights_[(index + i) * plane_ + at], by = value_[from + i] - value;
+      mean.value += weight * by;
+      mean.variance += weight * weight * pooled_[from + i];
+      mean.square += weight * weight;
+      const float change = weight * by / (pooled_[from + i] + variance + kTiny);
+      rise += change;
+      rise_value += change * by;
+    }
+  }
+  // The weights' own derivative, beside the texel's weight.
+  const float own = Weight(x, y, 0, 0);
+  constexpr float kPatch = 9;
+  mean.follows = own + kRising * 2 / (kPatch * kTolerance * kTolerance) * (rise_value - rise * mean.value);
+  mean.square += mean.follows * mean.follows - own * own;
+  mean.variance += variance * (mean.follows * mean.follows - own * own);
+  // Stein (1981): the mean square error is that of what the texel moved, less its variance, and twice what it follows.
+  mean.bias_square = mean.value * mean.value - (variance * (1 - 2 * mean.follows) + mean.variance) / margin;
+  mean.value += value;
+  return mean;
+}
+
+}  // namespace bakewell

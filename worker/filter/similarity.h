@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "worker/filter/connections.h"
+
+namespace bakewell {
+
+// The weights that a block of texels with a noisy signal is averaged with: non-local means (Buades et al. 2005), by how
+// far texels differ beyond their noise (Rousselle et al. 2012). Two texels are alike where the 3 x 3 texels around the
+// one and around the other differ by no more than their variances say; nearer ones count for more. A regression over
+// the texels that count takes off half of what a slope adds at the border of a chart.
+class SimilarTexels {
+ public:
+  static constexpr int kHalo = kWindowRadius + 2;  // texels around the block that its weights depend on
+
+  // A block of width x height texels without values.
+  SimilarTexels(int width, int height);
+
+  void Clear();
+  // A value and its variance at (x, y), -kHalo <= x < width + kHalo, likewise y. part: Connections::PartOf; of texels
+  // without one nothing is known.
+  void Put(int x, int y, float value, float variance, uint8_t part);
+
+  // After the last Put. around: there are values around the block.
+  void Compare(bool around);
+  // Takes the weights of what is not in `reached` from texel (x, y) of the block.
+  void Restrict(int x, int y, const WindowSet& reached);
+  // Makes the weights of each texel add up to one.
+  void Regress();
+
+  // Of texel (x + dx, y + dy) in the mean of texel (x, y) of the block. After Regress.
+  float Weight(int x, int y, int dx, int dy) const {
+    return weights_[WindowIndex(dx, dy) * plane_ + static_cast<size_t>(y) * row_ + static_cast<size_t>(x)];
+  }
+  // What a window's texels count for by their distance alone.
+  static float Nearness(int dx, int dy);
+
+  // The mean of a texel's window, and how good it is by Stein's estimate (Van De Ville & Kocher 2009): weights that are
+  // chosen by noisy values follow their noise.
+  struct Mean {
+    float value = 0;
+    float follows = 1;   // derivative by the texel's own value; without noise its weight
+    float square = 0;    // of the derivatives by all values: sum of the squares
+    float variance = 0;  // likewise, times the variances pooled over 3 x 3
+    float bias_square =
+        0;  // by how much more it is off from the value than noise explains; of one texel, may be negative
+  };
+  // margin: by how much the variances that were put are too large.
+  Mean MeanOf(int x, int y, float margin = 1) const;
+
+ private:
+  size_t Place(int x, int y) const { return static_cast<size_t>(y + kHalo) * stride_ + static_cast<size_t>(x + kHalo); }
+  void PoolVariances();
+  void CompareAt(int dx, int dy, bool around);
+  // Adds of row y of the texels at (x, y) and (x + dx, y + dy) the squared differences over their variances, of three
+  // side by side, and how many there are; x from `first` up to `end`.
+  void Differences(int y, int dx, int dy, int first, int end, float* squares, float* counts) const;
+
+  int width_, height_;
+  size_t stride_;       // of what is put
+  size_t row_, plane_;  // of weights
+  std::vector<float> value_, variance_, pooled_;
+  std::vector<int32_t> part_;
+  std::vector<float> weights_;  // kWindow planes
+};
+
+}  // namespace bakewell
