@@ -63,9 +63,56 @@ void Connections::NumberParts() {
   }
 }
 
+namespace {
+
+// One texel of a window, and its neighbour towards the centre.
+struct Inward {
+  int8_t dx, dy;
+  uint8_t index, neighbour, direction;
+};
+
+// Ring by ring.
+constexpr std::array<Inward, kWindow - 1> kInward = [] {
+  std::array<Inward, kWindow - 1> steps{};
+  size_t n = 0;
+  for (int ring = 1; ring <= kWindowRadius; ++ring) {
+    for (int dy = -ring; dy <= ring; ++dy) {
+      for (int dx = -ring; dx <= ring; dx += dy == -ring || dy == ring ? 1 : 2 * ring) {
+        constexpr std::array<uint8_t, 9> kDirection = {5, 6, 7, 4, 0, 0, 3, 2, 1};
+        const int in_x = (dx < 0) - (dx > 0), in_y = (dy < 0) - (dy > 0);
+        steps[n++] = {static_cast<int8_t>(dx), static_cast<int8_t>(dy), static_cast<uint8_t>(WindowIndex(dx, dy)),
+                      static_cast<uint8_t>(WindowIndex(dx + in_x, dy + in_y)),
+                      kDirection[static_cast<size_t>(3 * (in_y + 1) + in_x + 1)]};
+      }
+    }
+  }
+  return steps;
+}();
+
+}  // namespace
+
 WindowSet Connections::Reach(int x, int y) const {
   WindowSet reached;
   if (IsOpen(x, y)) return reached.set();
+  // Straight towards the centre: around a convex chart's border that is all there is.
+  reached[WindowIndex(0, 0)] = true;
+  const uint8_t part = PartOf(x, y);
+  bool missed = false;
+  for (const Inward& step : kInward) {
+    if (!Contains(x + step.dx, y + step.dy)) continue;
+    const Cell& cell = At(x + step.dx, y + step.dy);
+    if (cell.part != part) continue;
+    if (reached[step.neighbour] && (cell.open >> step.direction & 1) != 0) {
+      reached[step.index] = true;
+    } else {
+      missed = true;
+    }
+  }
+  return missed ? Search(x, y) : reached;
+}
+
+WindowSet Connections::Search(int x, int y) const {
+  WindowSet reached;
   std::array<std::array<int8_t, 2>, kWindow> waiting;
   size_t count = 0;
   const auto reach = [&](int dx, int dy) {

@@ -54,6 +54,7 @@ class Connections {
   size_t Place(int x, int y) const {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
+  WindowSet Search(int x, int y) const;
   void MeasureRoom();
   void NumberParts();
 

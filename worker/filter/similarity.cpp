@@ -46,7 +46,8 @@ SimilarTexels::SimilarTexels(int width, int height)
       stride_(static_cast<size_t>(width) + 2 * kHalo),
       row_(static_cast<size_t>(width)),
       plane_(row_ * static_cast<size_t>(height)),
-      weights_(kWindow * plane_) {
+      weights_(kWindow * plane_),
+      means_(plane_) {
   BAKEWELL_CHECK(stride_ <= kMostRow);
   const size_t size = stride_ * (static_cast<size_t>(height) + 2 * kHalo);
   value_.resize(size), variance_.resize(size), pooled_.resize(size), part_.resize(size);
@@ -157,7 +158,7 @@ void SimilarTexels::Restrict(int x, int y, const WindowSet& reached) {
   }
 }
 
-void SimilarTexels::Regress() {
+void SimilarTexels::Regress(float margin) {
   std::array<float, kMostRow> n, x, y, xx, xy, yy;
   for (size_t row = 0; row < plane_; row += row_) {
     for (auto* sum : {&n, &x, &y, &xx, &xy, &yy}) sum->fill(0);
@@ -190,35 +191,42 @@ void SimilarTexels::Regress() {
       for (size_t i = 0; i < row_; ++i) weight[i] *= n[i] + x[i] * dx + y[i] * dy;
     }
   }
+  for (int row = 0; row < height_; ++row) Average(row, margin);
 }
 
-SimilarTexels::Mean SimilarTexels::MeanOf(int x, int y, float margin) const {
-  Mean mean;
-  const size_t at = static_cast<size_t>(y) * row_ + static_cast<size_t>(x), center = Place(x, y);
-  const float value = value_[center], variance = pooled_[center];
-  float rise = 0, rise_value = 0;
+void SimilarTexels::Average(int y, float margin) {
+  std::array<float, kMostRow> moved{}, square{}, variance{}, rise{}, rise_moved{};
+  const size_t row = static_cast<size_t>(y) * row_;
+  const float *own_value = &value_[Place(0, y)], *own_variance = &pooled_[Place(0, y)];
   for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
-    const size_t from = Place(x - kWindowRadius, y + dy), index = WindowIndex(-kWindowRadius, dy);
-    for (size_t i = 0; i < kWindowSide; ++i) {
-      const float weight = weights_[(index + i) * plane_ + at], by = value_[from + i] - value;
-      mean.value += weight * by;
-      mean.variance += weight * weight * pooled_[from + i];
-      mean.square += weight * weight;
-      const float change = weight * by / (pooled_[from + i] + variance + kTiny);
-      rise += change;
-      rise_value += change * by;
+    for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
+      const float* weights = &weights_[WindowIndex(dx, dy) * plane_ + row];
+      const float *value = &value_[Place(dx, y + dy)], *pooled = &pooled_[Place(dx, y + dy)];
+      for (size_t i = 0; i < row_; ++i) {
+        const float weight = weights[i], by = value[i] - own_value[i], weighted = weight * by;
+        const float change = weighted / (pooled[i] + own_variance[i] + kTiny);
+        moved[i] += weighted;
+        square[i] += weight * weight;
+        variance[i] += weight * weight * pooled[i];
+        rise[i] += change;
+        rise_moved[i] += change * by;
+      }
     }
   }
-  // The weights' own derivative, beside the texel's weight.
-  const float own = Weight(x, y, 0, 0);
-  constexpr float kPatch = 9;
-  mean.follows = own + kRising * 2 / (kPatch * kTolerance * kTolerance) * (rise_value - rise * mean.value);
-  mean.square += mean.follows * mean.follows - own * own;
-  mean.variance += variance * (mean.follows * mean.follows - own * own);
-  // Stein (1981): the mean square error is that of what the texel moved, less its variance, and twice what it follows.
-  mean.bias_square = mean.value * mean.value - (variance * (1 - 2 * mean.follows) + mean.variance) / margin;
-  mean.value += value;
-  return mean;
+  const float* own = &weights_[WindowIndex(0, 0) * plane_ + row];
+  for (size_t i = 0; i < row_; ++i) {
+    Mean& mean = means_[row + i];
+    mean.value = own_value[i] + moved[i];
+    // The weights' own derivative, beside the texel's weight.
+    constexpr float kPatch = 9;
+    mean.follows = own[i] + kRising * 2 / (kPatch * kTolerance * kTolerance) * (rise_moved[i] - rise[i] * moved[i]);
+    const float chosen = mean.follows * mean.follows - own[i] * own[i];
+    mean.square = square[i] + chosen;
+    mean.variance = variance[i] + chosen * own_variance[i];
+    // Stein (1981): the mean square error is that of what the texel moved, less its variance, and twice what it
+    // follows.
+    mean.bias_square = moved[i] * moved[i] - (own_variance[i] * (1 - 2 * mean.follows) + mean.variance) / margin;
+  }
 }
 
 }  // namespace bakewell

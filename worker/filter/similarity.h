@@ -28,8 +28,8 @@ class SimilarTexels {
   void Compare(bool around);
   // Takes the weights of what is not in `reached` from texel (x, y) of the block.
   void Restrict(int x, int y, const WindowSet& reached);
-  // Makes the weights of each texel add up to one.
-  void Regress();
+  // Makes the weights of each texel add up to one. margin: by how much the variances that were put are too large.
+  void Regress(float margin = 1);
 
   // Of texel (x + dx, y + dy) in the mean of texel (x, y) of the block. After Regress.
   float Weight(int x, int y, int dx, int dy) const {
@@ -48,12 +48,13 @@ class SimilarTexels {
     float bias_square =
         0;  // by how much more it is off from the value than noise explains; of one texel, may be negative
   };
-  // margin: by how much the variances that were put are too large.
-  Mean MeanOf(int x, int y, float margin = 1) const;
+  // After Regress.
+  const Mean& MeanOf(int x, int y) const { return means_[static_cast<size_t>(y) * row_ + static_cast<size_t>(x)]; }
 
  private:
   size_t Place(int x, int y) const { return static_cast<size_t>(y + kHalo) * stride_ + static_cast<size_t>(x + kHalo); }
   void PoolVariances();
+  void Average(int y, float margin);
   void CompareAt(int dx, int dy, bool around);
   // Adds of row y of the texels at (x, y) and (x + dx, y + dy) the squared differences over their variances, of three
   // side by side, and how many there are; x from `first` up to `end`.
@@ -65,6 +66,7 @@ class SimilarTexels {
   std::vector<float> value_, variance_, pooled_;
   std::vector<int32_t> part_;
   std::vector<float> weights_;  // kWindow planes
+  std::vector<Mean> means_;     // a plane
 };
 
 }  // namespace bakewell

@@ -96,7 +96,7 @@ std::vector<SimilarTexels::Mean> SmoothTile::Smooth(const std::vector<float>& va
   for (const Place& place : places_) {
     if (place.part != 0 && !place.open) texels.Restrict(place.x, place.y, place.reach);
   }
-  texels.Regress();
+  texels.Regress(margin);
   std::vector<SimilarTexels::Mean> means(places_.size());
   for (size_t i = 0; i < places_.size(); ++i) {
     const Place& place = places_[i];
@@ -104,7 +104,7 @@ std::vector<SimilarTexels::Mean> SmoothTile::Smooth(const std::vector<float>& va
       means[i] = {value[i], 1, 1, variance[i]};
       continue;
     }
-    means[i] = texels.MeanOf(place.x, place.y, margin);
+    means[i] = texels.MeanOf(place.x, place.y);
     means[i].variance *= place.known;
     means[i].square *= place.known;
   }

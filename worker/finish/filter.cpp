@@ -31,6 +31,7 @@ class PageFilter {
     for (int top = 0; top < connections_.height(); top += kBlock) {
       for (int left = 0; left < connections_.width(); left += kBlock) AddBlock(left, top);
     }
+    reach_.resize(texels_.size());
   }
 
   // Returns what is to be added to FilterCounters::bias_square.
@@ -74,7 +75,7 @@ class PageFilter {
   }
 
   // The weights of a block's texels. False where nothing is noisy.
-  bool Weigh(const Block& block, SimilarTexels& weights) const {
+  bool Weigh(const Block& block, SimilarTexels& weights) {
     weights.Clear();
     bool noisy = false;
     constexpr int kHalo = SimilarTexels::kHalo;
@@ -94,9 +95,10 @@ class PageFilter {
     for (size_t k = block.begin; k < block.end; ++k) {
       const Texel& texel = map_.texels[texels_[k]];
       if (connections_.IsOpen(texel.x, texel.y)) continue;
-      weights.Restrict(texel.x - block.left, texel.y - block.top, connections_.Reach(texel.x, texel.y));
+      if (reach_[k].none()) reach_[k] = connections_.Reach(texel.x, texel.y);
+      weights.Restrict(texel.x - block.left, texel.y - block.top, reach_[k]);
     }
-    weights.Regress();
+    weights.Regress(static_cast<float>(SetNoise::kMargin));
     return true;
   }
 
@@ -158,7 +160,7 @@ class PageFilter {
       }
     }
     result = std::bit_cast<LightPart>(sum);
-    const SimilarTexels::Mean mean = weights.MeanOf(x, y, static_cast<float>(SetNoise::kMargin));
+    const SimilarTexels::Mean& mean = weights.MeanOf(x, y);
     const float chosen = mean.follows * mean.follows - own_weight * own_weight;  // the weights' part
     result.variance = variance + VarianceOf(LightAt(texel.x, texel.y)) * chosen;
     bias_square = static_cast<double>(mean.bias_square);
@@ -217,6 +219,7 @@ class PageFilter {
   Connections connections_;
   std::vector<Block> blocks_;
   std::vector<uint32_t> texels_;  // connected ones, block by block
+  std::vector<WindowSet> reach_;  // of each that is not open, once it was needed
 };
 
 }  // namespace
