@@ -7,10 +7,9 @@
 namespace bakewell {
 
 struct FilterCounters {
-  int64_t filtered = 0;  // texels whose window is more than themselves
-  // Sum over texels of the squared bias that windows add [W^2 m^-4, luminance]: by how much more texels move than their
-  // noise explains. It errs on the low side, since windows end where they part from a texel's own noise, and may be
-  // negative.
+  int64_t filtered = 0;  // texels whose mean is of more than themselves
+  // Sum over texels of the squared bias that filtering adds [W^2 m^-4, luminance], by Stein's estimate
+  // (SimilarTexels::Mean): right on the mean of many texels, and may be negative.
   double bias_square = 0;
 };
 
