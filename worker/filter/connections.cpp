@@ -15,6 +15,7 @@ void Connections::Connect(int x, int y, int k) {
 void Connections::Finish() {
   MeasureRoom();
   NumberParts();
+  FindConvex();
 }
 
 // Chebyshev distance to the nearest texel that lacks a connection, by two sweeps.
@@ -41,12 +42,13 @@ void Connections::MeasureRoom() {
 }
 
 void Connections::NumberParts() {
-  constexpr uint8_t kMostParts = 255;
-  uint8_t part = 0;
+  constexpr uint16_t kMostParts = 65535;
+  uint16_t part = 0;
   std::vector<size_t> waiting;
   for (size_t first = 0; first < cells_.size(); ++first) {
     if (cells_[first].part != 0 || cells_[first].open == 0) continue;
-    part = part % kMostParts + 1;
+    part = static_cast<uint16_t>(part % kMostParts + 1);
+    if (part >= convex_.size()) convex_.resize(part + size_t{1}, true);
     cells_[first].part = part;
     waiting.push_back(first);
     while (!waiting.empty()) {
@@ -60,6 +62,34 @@ void Connections::NumberParts() {
         waiting.push_back(next);
       }
     }
+  }
+}
+
+// Convex in rows and columns (such polyominoes have monotone paths: Castiglione & Restivo 2003), and connected wherever
+// its texels touch.
+void Connections::FindConvex() {
+  constexpr int kNone = -2;
+  std::vector<int> line(convex_.size(), kNone), last(convex_.size(), kNone);
+  const auto visit = [&](uint16_t part, int number, int at) {
+    if (part == 0) return;
+    if (line[part] == number && last[part] != at - 1) convex_[part] = false;
+    line[part] = number;
+    last[part] = at;
+  };
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      const Cell& cell = At(x, y);
+      visit(cell.part, y, x);
+      if (cell.part == 0 || cell.open == 0xff) continue;
+      for (size_t k = 0; k < 4; ++k) {
+        const int nx = x + kNeighbours[k][0], ny = y + kNeighbours[k][1];
+        if (!(cell.open >> k & 1) && Contains(nx, ny) && At(nx, ny).part == cell.part) convex_[cell.part] = false;
+      }
+    }
+  }
+  std::fill(line.begin(), line.end(), kNone);
+  for (int x = 0; x < width_; ++x) {
+    for (int y = 0; y < height_; ++y) visit(At(x, y).part, x, y);
   }
 }
 
@@ -91,26 +121,24 @@ constexpr std::array<Inward, kWindow - 1> kInward = [] {
 
 }  // namespace
 
-WindowSet Connections::Reach(int x, int y) const {
-  WindowSet reached;
-  if (IsOpen(x, y)) return reached.set();
+WindowSet Connections::CutOff(int x, int y) const {
+  WindowSet same, reached;
+  const uint16_t part = PartOf(x, y);
+  if (part == 0 || convex_[part] || IsOpen(x, y)) return {};
   // Straight towards the centre: around a convex chart's border that is all there is.
   reached[WindowIndex(0, 0)] = true;
-  const uint8_t part = PartOf(x, y);
-  bool missed = false;
   for (const Inward& step : kInward) {
     if (!Contains(x + step.dx, y + step.dy)) continue;
     const Cell& cell = At(x + step.dx, y + step.dy);
     if (cell.part != part) continue;
-    if (reached[step.neighbour] && (cell.open >> step.direction & 1) != 0) {
-      reached[step.index] = true;
-    } else {
-      missed = true;
-    }
+    same[step.index] = true;
+    reached[step.index] = reached[step.neighbour] && (cell.open >> step.direction & 1) != 0;
   }
-  return missed ? Search(x, y) : reached;
+  if ((same & ~reached).none()) return {};
+  return same & ~Search(x, y);
 }
 
+// The texels of its window that are reached from (x, y).
 WindowSet Connections::Search(int x, int y) const {
   WindowSet reached;
   std::array<std::array<int8_t, 2>, kWindow> waiting;

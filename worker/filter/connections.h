@@ -37,29 +37,33 @@ class Connections {
   void Finish();
 
   // Connected texels have the same number, most others do not; 0: connected to nothing.
-  uint8_t PartOf(int x, int y) const { return At(x, y).part; }
-  // All texels of its window are connected with each other.
-  bool IsOpen(int x, int y) const { return At(x, y).room >= kWindowRadius; }
-  // The texels of its window that can be reached from (x, y) from neighbour to neighbour without leaving the window.
-  WindowSet Reach(int x, int y) const;
+  uint16_t PartOf(int x, int y) const { return At(x, y).part; }
+  // What must not count in the mean of (x, y) though it has the same number: the texels of its window that are not
+  // reached from neighbour to neighbour without leaving the window.
+  WindowSet CutOff(int x, int y) const;
 
  private:
   struct Cell {
     uint8_t open = 0;  // bit k: connected to neighbour k; mutual
     uint8_t room = 0;  // rings around it whose texels are all connected
-    uint8_t part = 0;
+    uint16_t part = 0;
   };
   Cell& At(int x, int y) { return cells_[Place(x, y)]; }
   const Cell& At(int x, int y) const { return cells_[Place(x, y)]; }
   size_t Place(int x, int y) const {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
+  // All texels of its window are connected with each other.
+  bool IsOpen(int x, int y) const { return At(x, y).room >= kWindowRadius; }
   WindowSet Search(int x, int y) const;
   void MeasureRoom();
   void NumberParts();
+  void FindConvex();
 
   int width_, height_;
   std::vector<Cell> cells_;
+  // By number: between any two of its texels there is a path that never turns back, so that no window cuts it.
+  std::vector<bool> convex_;
 };
 
 }  // namespace bakewell

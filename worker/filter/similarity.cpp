@@ -59,7 +59,7 @@ void SimilarTexels::Clear() {
   std::fill(part_.begin(), part_.end(), 0);
 }
 
-void SimilarTexels::Put(int x, int y, float value, float variance, uint8_t part) {
+void SimilarTexels::Put(int x, int y, float value, float variance, uint16_t part) {
   const size_t at = Place(x, y);
   value_[at] = value;
   variance_[at] = variance;
@@ -151,28 +151,32 @@ void SimilarTexels::CompareAt(int dx, int dy, bool around) {
   }
 }
 
-void SimilarTexels::Restrict(int x, int y, const WindowSet& reached) {
+void SimilarTexels::CutOff(int x, int y, const WindowSet& cut) {
   const size_t at = static_cast<size_t>(y) * row_ + static_cast<size_t>(x);
   for (size_t index = 0; index < kWindow; ++index) {
-    if (!reached[index]) weights_[index * plane_ + at] = 0;
+    if (cut[index]) weights_[index * plane_ + at] = 0;
   }
 }
 
 void SimilarTexels::Regress(float margin) {
   std::array<float, kMostRow> n, x, y, xx, xy, yy;
   for (size_t row = 0; row < plane_; row += row_) {
-    for (auto* sum : {&n, &x, &y, &xx, &xy, &yy}) sum->fill(0);
-    for (size_t index = 0; index < kWindow; ++index) {
+    const float* center = &weights_[WindowIndex(0, 0) * plane_ + row];
+    for (auto* sum : {&x, &y, &xx, &xy, &yy}) sum->fill(0);
+    std::copy_n(center, row_, n.begin());
+    // Opposite texels at a time.
+    for (size_t index = 0; index < kWindow / 2; ++index) {
       const float dx = OffsetX(index), dy = OffsetY(index);
       const float* weight = &weights_[index * plane_ + row];
+      const float* opposite = &weights_[(kWindow - 1 - index) * plane_ + row];
       for (size_t i = 0; i < row_; ++i) {
-        const float w = weight[i];
-        n[i] += w;
-        x[i] += w * dx;
-        y[i] += w * dy;
-        xx[i] += w * (dx * dx);
-        xy[i] += w * (dx * dy);
-        yy[i] += w * (dy * dy);
+        const float sum = weight[i] + opposite[i], difference = weight[i] - opposite[i];
+        n[i] += sum;
+        x[i] += difference * dx;
+        y[i] += difference * dy;
+        xx[i] += sum * (dx * dx);
+        xy[i] += sum * (dx * dy);
+        yy[i] += sum * (dy * dy);
       }
     }
     // The plane through the window's mean, at its centre: by weights that are linear in dx and dy.

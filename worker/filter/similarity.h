@@ -22,12 +22,12 @@ class SimilarTexels {
   void Clear();
   // A value and its variance at (x, y), -kHalo <= x < width + kHalo, likewise y. part: Connections::PartOf; of texels
   // without one nothing is known.
-  void Put(int x, int y, float value, float variance, uint8_t part);
+  void Put(int x, int y, float value, float variance, uint16_t part);
 
   // After the last Put. around: there are values around the block.
   void Compare(bool around);
-  // Takes the weights of what is not in `reached` from texel (x, y) of the block.
-  void Restrict(int x, int y, const WindowSet& reached);
+  // Takes their weight in texel (x, y) of the block from those that are cut off.
+  void CutOff(int x, int y, const WindowSet& cut);
   // Makes the weights of each texel add up to one. margin: by how much the variances that were put are too large.
   void Regress(float margin = 1);
 

@@ -56,32 +56,53 @@ void SmoothTile::ConnectCell(int x, int y, uint32_t texel, const std::vector<boo
 }
 
 void SmoothTile::Locate(const std::vector<bool>& valid, const Connections& grid) {
-  std::array<bool, (kTileSide + 2 * kWindowRadius) * (kTileSide + 2 * kWindowRadius)> known{};
-  const auto known_at = [&](int x, int y) -> bool& {
-    return known[static_cast<size_t>((y + kWindowRadius) * (kTileSide + 2 * kWindowRadius) + x + kWindowRadius)];
+  constexpr size_t kRow = kTileSide + 2 * kWindowRadius;
+  std::array<int32_t, kRow * kRow> part, known{};
+  const auto at = [](int x, int y) {
+    return static_cast<size_t>(y + kWindowRadius) * kRow + static_cast<size_t>(x + kWindowRadius);
   };
+  for (int y = -kWindowRadius; y < kTileSide + kWindowRadius; ++y) {
+    for (int x = -kWindowRadius; x < kTileSide + kWindowRadius; ++x) {
+      part[at(x, y)] = grid.PartOf(x + kWindowRadius, y + kWindowRadius);
+    }
+  }
   places_.resize(end_ - begin_);
   for (size_t i = 0; i < places_.size(); ++i) {
     if (!valid[i]) continue;
     Place& place = places_[i];
     place.x = map_.texels[begin_ + i].x - left_;
     place.y = map_.texels[begin_ + i].y - top_;
-    place.part = grid.PartOf(place.x + kWindowRadius, place.y + kWindowRadius);
-    place.open = grid.IsOpen(place.x + kWindowRadius, place.y + kWindowRadius);
-    place.reach = grid.Reach(place.x + kWindowRadius, place.y + kWindowRadius);
-    known_at(place.x, place.y) = true;
+    place.part = static_cast<uint16_t>(part[at(place.x, place.y)]);
+    place.cut = grid.CutOff(place.x + kWindowRadius, place.y + kWindowRadius);
+    known[at(place.x, place.y)] = 1;
+  }
+  // By nearness, of each window's texels: those that are of its part, and of these the known ones.
+  std::array<std::array<float, kTileSide>, kTileSide> all{}, here{};
+  for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
+    for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
+      const float nearness = SimilarTexels::Nearness(dx, dy);
+      for (int y = 0; y < kTileSide; ++y) {
+        const int32_t *own = &part[at(0, y)], *other = &part[at(dx, y + dy)], *is_known = &known[at(dx, y + dy)];
+        for (size_t x = 0; x < kTileSide; ++x) {
+          const float counts = own[x] == other[x] ? nearness : 0.0f;
+          all[static_cast<size_t>(y)][x] += counts;
+          here[static_cast<size_t>(y)][x] += is_known[x] != 0 ? counts : 0.0f;
+        }
+      }
+    }
   }
   for (Place& place : places_) {
     if (place.part == 0) continue;
-    float all = 0, here = 0;
-    for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
-      for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
-        if (!place.reach[WindowIndex(dx, dy)]) continue;
-        all += SimilarTexels::Nearness(dx, dy);
-        here += known_at(place.x + dx, place.y + dy) ? SimilarTexels::Nearness(dx, dy) : 0;
-      }
+    float of_all = all[static_cast<size_t>(place.y)][static_cast<size_t>(place.x)];
+    float of_here = here[static_cast<size_t>(place.y)][static_cast<size_t>(place.x)];
+    for (size_t index = 0; place.cut.any() && index < kWindow; ++index) {
+      if (!place.cut[index]) continue;
+      const int dx = static_cast<int>(index) % kWindowSide - kWindowRadius;
+      const int dy = static_cast<int>(index) / kWindowSide - kWindowRadius;
+      of_all -= SimilarTexels::Nearness(dx, dy);
+      of_here -= known[at(place.x + dx, place.y + dy)] != 0 ? SimilarTexels::Nearness(dx, dy) : 0;
     }
-    place.known = here / all;
+    place.known = of_here / of_all;
   }
 }
 
@@ -94,7 +115,7 @@ std::vector<SimilarTexels::Mean> SmoothTile::Smooth(const std::vector<float>& va
   }
   texels.Compare(false);
   for (const Place& place : places_) {
-    if (place.part != 0 && !place.open) texels.Restrict(place.x, place.y, place.reach);
+    if (place.cut.any()) texels.CutOff(place.x, place.y, place.cut);
   }
   texels.Regress(margin);
   std::vector<SimilarTexels::Mean> means(places_.size());

@@ -28,11 +28,10 @@ class SmoothTile {
 
  private:
   struct Place {
-    int x = 0, y = 0;  // in the tile
-    uint8_t part = 0;  // 0: not valid, or connected to nothing
-    bool open = false;
-    WindowSet reach;
-    float known = 1;  // share of its window, by nearness, that is valid texels of the tile
+    int x = 0, y = 0;   // in the tile
+    uint16_t part = 0;  // 0: not valid, or connected to nothing
+    WindowSet cut;      // Connections::CutOff
+    float known = 1;    // share of its window, by nearness, that is valid texels of the tile
   };
   int32_t TexelAt(int x, int y) const;
   bool IsMine(uint32_t texel) const { return texel >= begin_ && texel < end_; }

@@ -31,7 +31,6 @@ class PageFilter {
     for (int top = 0; top < connections_.height(); top += kBlock) {
       for (int left = 0; left < connections_.width(); left += kBlock) AddBlock(left, top);
     }
-    reach_.resize(texels_.size());
   }
 
   // Returns what is to be added to FilterCounters::bias_square.
@@ -75,14 +74,14 @@ class PageFilter {
   }
 
   // The weights of a block's texels. False where nothing is noisy.
-  bool Weigh(const Block& block, SimilarTexels& weights) {
+  bool Weigh(const Block& block, SimilarTexels& weights) const {
     weights.Clear();
     bool noisy = false;
     constexpr int kHalo = SimilarTexels::kHalo;
     for (int y = -kHalo; y < kBlock + kHalo; ++y) {
       for (int x = -kHalo; x < kBlock + kHalo; ++x) {
         if (!connections_.Contains(block.left + x, block.top + y)) continue;
-        const uint8_t part = connections_.PartOf(block.left + x, block.top + y);
+        const uint16_t part = connections_.PartOf(block.left + x, block.top + y);
         if (part == 0) continue;
         const TexelLight& light = LightAt(block.left + x, block.top + y);
         const float variance = Luminance(VarianceOf(light));
@@ -94,9 +93,8 @@ class PageFilter {
     weights.Compare(true);
     for (size_t k = block.begin; k < block.end; ++k) {
       const Texel& texel = map_.texels[texels_[k]];
-      if (connections_.IsOpen(texel.x, texel.y)) continue;
-      if (reach_[k].none()) reach_[k] = connections_.Reach(texel.x, texel.y);
-      weights.Restrict(texel.x - block.left, texel.y - block.top, reach_[k]);
+      const WindowSet cut = connections_.CutOff(texel.x, texel.y);
+      if (cut.any()) weights.CutOff(texel.x - block.left, texel.y - block.top, cut);
     }
     weights.Regress(static_cast<float>(SetNoise::kMargin));
     return true;
@@ -219,7 +217,6 @@ class PageFilter {
   Connections connections_;
   std::vector<Block> blocks_;
   std::vector<uint32_t> texels_;  // connected ones, block by block
-  std::vector<WindowSet> reach_;  // of each that is not open, once it was needed
 };
 
 }  // namespace
