@@ -10,8 +10,8 @@ namespace bakewell {
 namespace {
 
 constexpr float kDeviation = 2.5f;  // of the weights by distance [texels]
-// Texels whose squared difference is on the mean as large as their noise makes it count in full; one that is by
-// kTolerance squared larger, 1 / e of that.
+// Texels whose squared differences are on the mean as large as their variances make them count in full; where they are
+// larger by kTolerance squared of that, by 1 / e.
 constexpr float kTolerance = 0.9f;
 constexpr float kSlopeShare = 0.5f;  // of what the regression says: all of it is noisier, none of it is more biased
 constexpr float kRising = 0.6f;      // of pairs, whose weight falls where they differ more

@@ -42,11 +42,10 @@ class SimilarTexels {
   // chosen by noisy values follow their noise.
   struct Mean {
     float value = 0;
-    float follows = 1;   // derivative by the texel's own value; without noise its weight
-    float square = 0;    // of the derivatives by all values: sum of the squares
-    float variance = 0;  // likewise, times the variances pooled over 3 x 3
-    float bias_square =
-        0;  // by how much more it is off from the value than noise explains; of one texel, may be negative
+    float follows = 1;      // derivative by the texel's own value; its weight, and more
+    float square = 0;       // of the derivatives by all values, sum of the squares
+    float variance = 0;     // likewise, times the variances pooled over 3 x 3
+    float bias_square = 0;  // of the error what noise does not explain; for one texel a guess, and may be negative
   };
   // After Regress.
   const Mean& MeanOf(int x, int y) const { return means_[static_cast<size_t>(y) * row_ + static_cast<size_t>(x)]; }
@@ -56,8 +55,8 @@ class SimilarTexels {
   void PoolVariances();
   void Average(int y, float margin);
   void CompareAt(int dx, int dy, bool around);
-  // Adds of row y of the texels at (x, y) and (x + dx, y + dy) the squared differences over their variances, of three
-  // side by side, and how many there are; x from `first` up to `end`.
+  // Of texels (x, y) and (x + dx, y + dy) and those to their left and right: the sum of the squared differences over
+  // their variances, and how many there are. Element x - first, x from `first` up to `end`.
   void Differences(int y, int dx, int dy, int first, int end, float* squares, float* counts) const;
 
   int width_, height_;

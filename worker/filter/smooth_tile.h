@@ -22,7 +22,7 @@ class SmoothTile {
 
   // value, variance: of each texel of the tile before filtering, of which only valid ones count. Returns the same after
   // filtering, one element a texel. The variance is that of the page, where texels around the tile will be as well
-  // known as its own.
+  // known as its own. margin: as in SimilarTexels::Regress.
   std::vector<SimilarTexels::Mean> Smooth(const std::vector<float>& value, const std::vector<float>& variance,
                                           float margin) const;
 
