@@ -91,28 +91,66 @@ TEST(LevelFarm, PagesCanBeLookedAtWhileTheyAreGathered) {
   EXPECT_EQ(client.FetchPreview(job->id(), gone, dir.path()).code(), absl::StatusCode::kDataLoss);
 }
 
-TEST(LevelExecutor, StoppedPhotonsAreNoResult) {
-  const std::string scene = SampleScene();
-  BakeSettings settings;
-  settings.quality = Quality::kPreview;
-  settings.resolution = 32;
-  settings.photons = 100000;  // which the survey says to the tasks after it
-  const std::string task = level_task::Serialize({SettingsJson(settings), 0, 1});
-  const auto layout =
-      ChartTasks()[0].run({level_task::kChart.kind, level_task::kChart.code_version, task, {}}, {scene});
-  ASSERT_TRUE(layout.ok()) << layout.status();
-  TaskSpec spec{level_task::kEmit.kind, level_task::kEmit.code_version, task, {}};
+// A task of the sample scene at 32 texels a side.
+struct SampleTask {
+  TaskSpec spec;
   TaskInputs inputs;
-  for (const auto& [name, blob] :
-       {std::pair<std::string, std::string>("scene", scene), {"layout", (*layout)[0].bytes}}) {
-    spec.inputs.push_back({name, Sha256Of(blob)});
-    inputs.emplace_back(name, std::make_shared<const std::string>(blob));
+
+  explicit SampleTask(const level_task::KindName& kind) {
+    const std::string scene = SampleScene();
+    BakeSettings settings;
+    settings.quality = Quality::kPreview;
+    settings.resolution = 32;
+    settings.photons = 100000;  // which the survey says to the tasks after it
+    const std::string task = level_task::Serialize({SettingsJson(settings), 0, 1});
+    const auto layout =
+        ChartTasks()[0].run({level_task::kChart.kind, level_task::kChart.code_version, task, {}}, {scene});
+    EXPECT_TRUE(layout.ok()) << layout.status();
+    spec = {kind.kind, kind.code_version, task, {}};
+    for (const auto& [name, blob] :
+         {std::pair<std::string, std::string>("scene", scene), {"layout", (*layout)[0].bytes}}) {
+      spec.inputs.push_back({name, Sha256Of(blob)});
+      inputs.emplace_back(name, std::make_shared<const std::string>(blob));
+    }
   }
+};
+
+TEST(LevelExecutor, StoppedPhotonsAreNoResult) {
+  const SampleTask emit(level_task::kEmit);
   LevelExecutor executor;
-  EXPECT_TRUE(executor.Run(spec, inputs, {}).ok());
+  EXPECT_TRUE(executor.Run(emit.spec, emit.inputs, {}).ok());
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_TRUE(absl::IsCancelled(executor.Run(spec, inputs, stop.get_token()).status()));
+  EXPECT_TRUE(absl::IsCancelled(executor.Run(emit.spec, emit.inputs, stop.get_token()).status()));
+}
+
+// Symptom: a level of many textures loaded for five seconds after Ctrl-C, and the bar stood still meanwhile.
+TEST(LevelExecutor, StopsWhileALevelLoadsAndSaysHowFarItIs) {
+  class StopAt final : public Progress {
+   public:
+    explicit StopAt(int64_t step) : step_(step) {}
+    void Report(std::string_view phase, int64_t done, int64_t total) override {
+      EXPECT_EQ(phase, "texels");
+      EXPECT_GE(done, last);
+      EXPECT_LE(done, total);
+      last = done;
+      if (done == step_) stop.request_stop();
+    }
+    std::stop_source stop;
+    int64_t last = 0;
+
+   private:
+    const int64_t step_;
+  };
+  const SampleTask survey(level_task::kSurvey);
+  for (int step = 0; step < kSurveySteps; ++step) {
+    StopAt progress(step);
+    LevelExecutor executor({.threads = 1, .process_threads = 0, .progress = &progress});
+    EXPECT_TRUE(absl::IsCancelled(executor.Run(survey.spec, survey.inputs, progress.stop.get_token()).status()));
+    EXPECT_EQ(std::exchange(progress.last, 0), step);
+    EXPECT_TRUE(executor.Run(survey.spec, survey.inputs, {}).ok()) << "what was stopped is made again";
+    EXPECT_EQ(progress.last, kSurveySteps);
+  }
 }
 
 TEST(LevelFarm, HostileSettingsAndScenesAreRefusedAtSubmit) {

@@ -148,14 +148,15 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Run(const TaskSpec& spec, const TaskI
   return absl::UnimplementedError(absl::StrCat("this worker does not know ", spec.kind));
 }
 
-absl::StatusOr<std::shared_ptr<const Level>> LevelExecutor::LevelOf(const Work& work) {
+absl::StatusOr<std::shared_ptr<const Level>> LevelExecutor::LevelOf(const Work& work, Progress* listener) {
   const Digest key = KeyOfInputs(work.spec, {"scene", "layout"}, LevelSettings(work.settings));
   return levels_.Get(key, [&]() -> Recent<Level>::Made {
     BAKEWELL_ASSIGN_OR_RETURN(const Blob scene_bytes, FindInput(work.inputs, "scene"));
     BAKEWELL_ASSIGN_OR_RETURN(const Blob layout_bytes, FindInput(work.inputs, "layout"));
     BAKEWELL_ASSIGN_OR_RETURN(Scene scene, ParseScene(std::as_bytes(std::span(*scene_bytes))));
     BAKEWELL_ASSIGN_OR_RETURN(AtlasLayout layout, ParseLayout(*layout_bytes));
-    return BuildLevel(std::move(scene), std::move(layout), work.settings);
+    StopProgress progress(work.stop, listener);
+    return BuildLevel(std::move(scene), std::move(layout), work.settings, progress);
   });
 }
 
@@ -170,8 +171,8 @@ absl::StatusOr<std::shared_ptr<const PhotonStage>> LevelExecutor::PhotonStageOf(
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
-  Say("texels", 0, 1);
-  BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work));
+  Say("texels", 0, kSurveySteps);
+  BAKEWELL_ASSIGN_OR_RETURN(const auto level, LevelOf(work, options_.progress));
   level_task::Survey survey;
   survey.texels = static_cast<uint64_t>(level->texels->texel_count());
   StopProgress progress(work.stop, nullptr);
@@ -187,7 +188,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
     survey.texels_of_tile.insert(survey.texels_of_tile.end(), page.texels_of_tile.begin(), page.texels_of_tile.end());
     survey.tile_end_of_page.push_back(static_cast<uint32_t>(page.end_tile()));
   }
-  Say("texels", 1, 1);
+  Say("texels", kSurveySteps, kSurveySteps);
   return MadeOutputs{{"survey", level_task::Serialize(survey)}};
 }
 

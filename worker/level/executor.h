@@ -44,7 +44,7 @@ class LevelExecutor final : public TaskExecutor {
     RadianceCache cache;
     float mean_irradiance = 0, photon_flux = 0;
   };
-  absl::StatusOr<std::shared_ptr<const Level>> LevelOf(const Work& work);
+  absl::StatusOr<std::shared_ptr<const Level>> LevelOf(const Work& work, Progress* listener = nullptr);
   absl::StatusOr<std::shared_ptr<const PhotonStage>> PhotonStageOf(const Work& work, const Level& level);
 
   absl::StatusOr<MadeOutputs> Survey(const Work& work);

@@ -58,16 +58,27 @@ Budget BudgetOf(const BakeSettings& settings, int64_t texels) {
   return budget;
 }
 
-absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout layout, const BakeSettings& settings) {
+absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout layout, const BakeSettings& settings,
+                                                        Progress& progress) {
   const FlushDenormals mode;
+  int done = 0;
+  const auto step = [&] {
+    progress.Report("texels", done++, kSurveySteps);
+    return progress.Cancelled() ? absl::CancelledError("stopped") : absl::OkStatus();
+  };
   auto level = std::make_shared<Level>();
   level->scene = std::move(scene);
   level->layout = std::move(layout);
+  BAKEWELL_RETURN_IF_ERROR(step());
   BAKEWELL_ASSIGN_OR_RETURN(level->world,
                             World::Build(level->scene, settings.backfaces, settings.albedo_limit, settings.no_skip));
+  BAKEWELL_RETURN_IF_ERROR(step());
   level->lights = std::make_unique<LightSet>(*level->world, level->scene.environment);
+  BAKEWELL_RETURN_IF_ERROR(step());
   level->tree = std::make_unique<LightTree>(*level->lights);
+  BAKEWELL_RETURN_IF_ERROR(step());
   level->texels = std::make_unique<TexelPages>(*level->world, level->layout, settings.footprint);
+  BAKEWELL_RETURN_IF_ERROR(step());
   if (level->texels->texel_count() == 0) {
     return absl::InvalidArgumentError(
         "no lightmapped surface covers a texel: every mesh has extras.lightmapped false or no area");

@@ -34,8 +34,11 @@ struct Level {
   std::unique_ptr<LightTree> tree;  // over them
   std::unique_ptr<TexelPages> texels;
 };
-// kInvalidArgument: no lightmapped surface covers a texel.
-absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout layout, const BakeSettings& settings);
+// A large level takes seconds: reports to `progress` as phase "texels", of kSurveySteps, and looks at it in between
+// whether to stop. kInvalidArgument: no lightmapped surface covers a texel. kCancelled.
+inline constexpr int kSurveySteps = 5;  // the last is the survey's own
+absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout layout, const BakeSettings& settings,
+                                                        Progress& progress);
 
 // Mean luminance that the photons brought to the fronts of lightmapped surfaces, to judge errors against.
 float MeanIrradiance(const TexelMap& texels, const SurfaceCells& cells, const RadianceCache& cache);

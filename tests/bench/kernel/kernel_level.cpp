@@ -31,7 +31,8 @@ absl::StatusOr<std::unique_ptr<KernelLevel>> LoadKernelLevel(const std::string& 
   made->name = std::filesystem::path(path).stem().string();
   BAKEWELL_ASSIGN_OR_RETURN(LoadedLevel loaded, LoadLevel(path));
   BAKEWELL_ASSIGN_OR_RETURN(AtlasLayout layout, ChooseCharts(loaded.scene, settings));
-  BAKEWELL_ASSIGN_OR_RETURN(made->level, BuildLevel(std::move(loaded.scene), std::move(layout), settings));
+  NoProgress progress;
+  BAKEWELL_ASSIGN_OR_RETURN(made->level, BuildLevel(std::move(loaded.scene), std::move(layout), settings, progress));
   const Level& level = *made->level;
   made->texels = level.texels->Page(0);
   settings.photons = kPhotonsPerTexel * level.texels->texel_count();
@@ -39,7 +40,6 @@ absl::StatusOr<std::unique_ptr<KernelLevel>> LoadKernelLevel(const std::string& 
   made->stage = BuildPhotonStage({*level.world, *level.lights, level.texels->texel_count(), starts}, settings.photons,
                                  settings.seed);
   made->photons.flux.resize(2 * made->stage->cells.cells().size());
-  NoProgress progress;
   EmitPhotons(*level.world, *level.lights, made->stage->guide, made->stage->cells, made->stage->plan, 0,
               made->stage->plan.photons, progress, made->photons);
   made->cache = EstimateDensity(*level.world, made->stage->cells, made->photons, made->stage->plan, {}, progress);
