@@ -31,6 +31,7 @@ class PageFilter {
     for (int top = 0; top < connections_.height(); top += kBlock) {
       for (int left = 0; left < connections_.width(); left += kBlock) AddBlock(left, top);
     }
+    tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) { Cut(blocks_[b]); });
   }
 
   // Returns what is to be added to FilterCounters::bias_square.
@@ -41,10 +42,11 @@ class PageFilter {
     std::vector<double> bias_square(texels_.size(), 0);
     tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) {
       const Block& block = blocks_[b];
-      thread_local SimilarTexels weights(kBlock, kBlock);
-      if (!Weigh(block, weights)) return;
+      thread_local Workspace work;
+      if (!Weigh(block, work)) return;
       for (size_t k = block.begin; k < block.end; ++k) {
-        changed[k] = Smooth(block, map_.texels[texels_[k]], weights, smooth[k], bias_square[k]) ? 1 : 0;
+        const Texel& texel = map_.texels[texels_[k]];
+        changed[k] = Smooth(texel.x - block.left, texel.y - block.top, work, smooth[k], bias_square[k]) ? 1 : 0;
       }
     });
     Settle(changed, bias_square, smooth);
@@ -60,10 +62,30 @@ class PageFilter {
   struct Block {
     int left = 0, top = 0;
     size_t begin = 0, end = 0;  // of texels_
+    struct Cut {
+      int x = 0, y = 0;  // in the block
+      WindowSet texels;
+    };
+    std::vector<Cut> cuts;  // Connections::CutOff, where there is any
+  };
+  // The part that is filtered: irradiance and SH side by side, filled up to four registers.
+  static constexpr size_t kWide = 32;
+  struct alignas(32) PartLight {
+    std::array<float, kWide> numbers;
+    Rgb variance;
+  };
+  // A block's texels and those around it.
+  struct Workspace {
+    static constexpr int kSide = kBlock + 2 * SimilarTexels::kHalo;
+    SimilarTexels weights{kBlock, kBlock};
+    std::vector<PartLight> light = std::vector<PartLight>(size_t{kSide} * kSide);
+    PartLight& At(int x, int y) {
+      return light[static_cast<size_t>((y + SimilarTexels::kHalo) * kSide + x + SimilarTexels::kHalo)];
+    }
   };
 
   void AddBlock(int left, int top) {
-    Block block{left, top, texels_.size(), 0};
+    Block block{left, top, texels_.size(), 0, {}};
     for (int y = top; y < std::min(top + kBlock, connections_.height()); ++y) {
       for (int x = left; x < std::min(left + kBlock, connections_.width()); ++x) {
         if (connections_.PartOf(x, y) != 0) texels_.push_back(static_cast<uint32_t>(TexelAt(x, y)));
@@ -73,8 +95,17 @@ class PageFilter {
     if (block.begin < block.end) blocks_.push_back(block);
   }
 
+  void Cut(Block& block) const {
+    for (size_t k = block.begin; k < block.end; ++k) {
+      const Texel& texel = map_.texels[texels_[k]];
+      const WindowSet cut = connections_.CutOff(texel.x, texel.y);
+      if (cut.any()) block.cuts.push_back({texel.x - block.left, texel.y - block.top, cut});
+    }
+  }
+
   // The weights of a block's texels. False where nothing is noisy.
-  bool Weigh(const Block& block, SimilarTexels& weights) const {
+  bool Weigh(const Block& block, Workspace& work) const {
+    SimilarTexels& weights = work.weights;
     weights.Clear();
     bool noisy = false;
     constexpr int kHalo = SimilarTexels::kHalo;
@@ -84,18 +115,15 @@ class PageFilter {
         const uint16_t part = connections_.PartOf(block.left + x, block.top + y);
         if (part == 0) continue;
         const TexelLight& light = LightAt(block.left + x, block.top + y);
-        const float variance = Luminance(VarianceOf(light));
+        PartLight& filtered = work.At(x, y) = PartOf(light);
+        const float variance = Luminance(filtered.variance);
         noisy |= variance > 0;
         weights.Put(x, y, ValueOf(light), variance, part);
       }
     }
     if (!noisy) return false;
     weights.Compare(true);
-    for (size_t k = block.begin; k < block.end; ++k) {
-      const Texel& texel = map_.texels[texels_[k]];
-      const WindowSet cut = connections_.CutOff(texel.x, texel.y);
-      if (cut.any()) weights.CutOff(texel.x - block.left, texel.y - block.top, cut);
-    }
+    for (const Block::Cut& cut : block.cuts) weights.CutOff(cut.x, cut.y, cut.texels);
     weights.Regress(static_cast<float>(SetNoise::kMargin));
     return true;
   }
@@ -129,38 +157,38 @@ class PageFilter {
     }
   }
 
-  // The numbers of a part, or of the whole, side by side; the last three are its variance.
-  static constexpr size_t kNumbers = 33, kVariance = 30, kWide = 32;
-  using Numbers = std::array<float, kNumbers>;
-  static_assert(sizeof(LightPart) == sizeof(Numbers) && offsetof(LightPart, variance) == kVariance * sizeof(float) &&
-                offsetof(TexelLight, variance) == kVariance * sizeof(float));
+  static_assert(sizeof(LightPart) == 33 * sizeof(float) && offsetof(LightPart, variance) == 30 * sizeof(float) &&
+                offsetof(TexelLight, variance) == 30 * sizeof(float));
 
-  // Four registers' worth; what is wrong at the end is put right by the caller.
-  static void AddWeighted(const float* numbers, float weight, Numbers& sum) {
-    for (size_t k = 0; k < kWide; ++k) sum[k] += numbers[k] * weight;
+  PartLight PartOf(const TexelLight& light) const {
+    PartLight part;
+    part.variance = VarianceOf(light);
+    const float *whole = &light.irradiance.x, *indirect = &light.indirect.irradiance.x;
+    for (size_t k = 0; k < kWide; ++k) {
+      part.numbers[k] = signal_ == Signal::kIndirect ? indirect[k] : whole[k] - indirect[k];
+    }
+    return part;
   }
 
-  bool Smooth(const Block& block, const Texel& texel, const SimilarTexels& weights, LightPart& result,
-              double& bias_square) const {
-    const int x = texel.x - block.left, y = texel.y - block.top;
-    const float own_weight = weights.Weight(x, y, 0, 0);
+  // (x, y) is in the block.
+  bool Smooth(int x, int y, Workspace& work, LightPart& result, double& bias_square) const {
+    const float own_weight = work.weights.Weight(x, y, 0, 0);
     if (own_weight == 1) return false;
-    Numbers sum{};
+    std::array<float, sizeof(LightPart) / sizeof(float)> sum{};  // of which the variance is put right at the end
     Rgb variance;
     for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
       for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
-        const float weight = weights.Weight(x, y, dx, dy);
+        const float weight = work.weights.Weight(x, y, dx, dy);
         if (weight == 0) continue;
-        const TexelLight& light = LightAt(texel.x + dx, texel.y + dy);
-        if (signal_ == Signal::kDirect) AddWeighted(&light.irradiance.x, weight, sum);
-        AddWeighted(&light.indirect.irradiance.x, signal_ == Signal::kDirect ? -weight : weight, sum);
-        variance += VarianceOf(light) * (weight * weight);
+        const PartLight& light = work.At(x + dx, y + dy);
+        for (size_t k = 0; k < kWide; ++k) sum[k] += light.numbers[k] * weight;
+        variance += light.variance * (weight * weight);
       }
     }
     result = std::bit_cast<LightPart>(sum);
-    const SimilarTexels::Mean& mean = weights.MeanOf(x, y);
+    const SimilarTexels::Mean& mean = work.weights.MeanOf(x, y);
     const float chosen = mean.follows * mean.follows - own_weight * own_weight;  // the weights' part
-    result.variance = variance + VarianceOf(LightAt(texel.x, texel.y)) * chosen;
+    result.variance = variance + work.At(x, y).variance * chosen;
     bias_square = static_cast<double>(mean.bias_square);
     return std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) >= 0;
   }
