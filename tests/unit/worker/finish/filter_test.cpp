@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/statistics.h"
+#include "worker/filter/connections.h"
 
 namespace bakewell {
 namespace {
@@ -144,6 +145,30 @@ TEST(FilterPage, InvalidTexelsAreNoEvidence) {
   for (size_t i = 0; i < page.lights.size(); ++i) {
     EXPECT_TRUE(!page.lights[i].valid || page.lights[i].irradiance.z < 100);
   }
+}
+
+// A wall stands between rows 11 and 12, from the left to column 19; around its end both sides are one chart.
+TEST(FilterPage, LightStaysOnItsSideOfAWall) {
+  NoisyPage page(1);
+  constexpr int kEnd = 19;
+  for (size_t i = 0; i < page.lights.size(); ++i) {
+    const Texel& texel = page.map.texels[i];
+    TexelLight& light = page.lights[i];
+    if (texel.y == 11 && texel.x <= kEnd) light.open &= 1;
+    if (texel.y == 11 && texel.x == kEnd + 1) light.open &= static_cast<uint8_t>(~8);
+    const float e = texel.y < 12 ? 1.0f : 5.0f;
+    light.irradiance = light.indirect.irradiance = Rgb{1, 1, 1} * e;
+    light.variance = light.indirect.variance = Rgb{1, 1, 1} * 100;  // would hide the difference
+  }
+  FilterCounters counters;
+  FilterPage(page.map, 0, page.lights, counters);
+  for (size_t i = 0; i < page.lights.size(); ++i) {
+    const Texel& texel = page.map.texels[i];
+    if (texel.x > kEnd - kWindowRadius) continue;  // its window does not see the wall's end
+    EXPECT_NEAR(page.lights[i].irradiance.y, texel.y < 12 ? 1 : 5, 0.3) << texel.x << " " << texel.y;
+  }
+  const TexelLight& beyond = page.lights[11 * kSide + kSide - 1];
+  EXPECT_GT(beyond.irradiance.y, 1.5f);
 }
 
 }  // namespace
