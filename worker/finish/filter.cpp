@@ -129,8 +129,8 @@ class PageFilter {
   }
 
   int32_t TexelAt(int x, int y) const {
-    return map_
-        .texel_at[page_][static_cast<size_t>(y) * static_cast<size_t>(connections_.width()) + static_cast<size_t>(x)];
+    const auto width = static_cast<size_t>(connections_.width());
+    return map_.texel_at[page_][static_cast<size_t>(y) * width + static_cast<size_t>(x)];
   }
   const TexelLight& LightAt(int x, int y) const { return lights_[TexelAt(x, y)]; }
 
@@ -193,8 +193,8 @@ class PageFilter {
     return std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) >= 0;
   }
 
-  // By charts: windows that avoid a bright stray lose its light, so the sum is brought back to what it was; and what
-  // they blur is counted as variance, where texels that are alike say it together.
+  // By charts: weights that avoid a bright stray lose its light, so the sum is brought back to what it was; and what
+  // they blur is counted as variance: one texel's bias is a guess, a chart's is not.
   void Settle(const std::vector<uint8_t>& changed, const std::vector<double>& bias_square,
               std::vector<LightPart>& smooth) const {
     struct Sum {

@@ -20,6 +20,7 @@ struct Budget {
   GatherOptions gather;
   int64_t least_photons = 0, most_photons = 0;  // PhotonsFor chooses
 };
+
 // How the photons' density is estimated.
 DensityOptions DensityOf(const BakeSettings& settings);
 
@@ -34,9 +35,9 @@ struct Level {
   std::unique_ptr<LightTree> tree;  // over them
   std::unique_ptr<TexelPages> texels;
 };
-// A large level takes seconds: reports to `progress` as phase "texels", of kSurveySteps, and looks at it in between
-// whether to stop. kInvalidArgument: no lightmapped surface covers a texel. kCancelled.
-inline constexpr int kSurveySteps = 5;  // the last is the survey's own
+inline constexpr int kSurveySteps = 5;  // of phase "texels"; the last is the survey's own
+// A large level takes seconds: reports its steps to `progress` and looks at it in between whether to stop.
+// kInvalidArgument: no lightmapped surface covers a texel. kCancelled.
 absl::StatusOr<std::shared_ptr<const Level>> BuildLevel(Scene scene, AtlasLayout layout, const BakeSettings& settings,
                                                         Progress& progress);
 
