@@ -8,11 +8,13 @@ namespace {
 
 constexpr double kAim = 0.95;  // of the sum that is allowed: rounds for the last crumbs cost more than they bring
 
+constexpr double kWorthSparing = 0.5;  // errors below gain too little
+
 constexpr float kChartsShare = 0.1f;  // of what a texel's variance is taken to be, the rest its neighbourhood's
 
 }  // namespace
 
-std::vector<bool> Allot(std::span<const Claim> claims, size_t texels) {
+std::vector<bool> Allot(std::span<const Claim> claims, size_t texels, double& spare) {
   struct Next {
     double error, cost;
     int doublings;
@@ -49,6 +51,12 @@ std::vector<bool> Allot(std::span<const Claim> claims, size_t texels) {
     if (next.doublings == 0) continue;
     heap.push_back(next);
     std::push_heap(heap.begin(), heap.end());
+  }
+  while (enough && !heap.empty() && heap.front().cost <= spare && heap.front().error > kWorthSparing) {
+    std::pop_heap(heap.begin(), heap.end());
+    spare -= heap.back().cost;
+    granted[heap.back().claim] = true;
+    heap.pop_back();
   }
   return granted;
 }

@@ -20,8 +20,10 @@ struct Claim {
 // all gain alike (Neyman's allocation, with the marginal rule of Lagrange). Where a lit plain has less noise than it
 // may, the penumbra in its middle may have more. Granted is who will need to double at all until the sum is met, a few
 // rounds ahead: what a penumbra still owes after this round is no reason for the plain to double in it.
+// spare: what may be spent once the sum is met, in the unit of the costs, on those that gain most; what is granted of
+// it is taken off.
 inline constexpr float kWorst = 2;  // standard errors over what is tolerated
-std::vector<bool> Allot(std::span<const Claim> claims, size_t texels);
+std::vector<bool> Allot(std::span<const Claim> claims, size_t texels, double& spare);
 // Whether Allot grants nothing.
 bool IsMet(std::span<const Claim> claims, size_t texels);
 

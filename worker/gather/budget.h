@@ -47,13 +47,14 @@ class TileBudget {
   void CorrectVariances(std::vector<TexelWork>& work) const;
   std::vector<Claim> Claims(const std::vector<TexelWork>& work, const Part& direct, const Part& indirect,
                             const std::vector<float>& light) const;
-  void Grant(const std::vector<Claim>& claims, size_t valid, std::vector<TexelWork>& work) const;
+  void Grant(const std::vector<Claim>& claims, size_t valid, std::vector<TexelWork>& work);
 
   const TexelMap& map_;
   const uint32_t begin_;
   const GatherOptions& options_;
   std::optional<SmoothTile> tile_;
   Filtered direct_, indirect_;
+  std::optional<double> spare_;  // of Allot
 };
 
 }  // namespace bakewell

@@ -13,7 +13,7 @@ namespace bakewell {
 
 // When a texel has had enough.
 struct GatherOptions {
-  int min_samples = 16;  // powers of two, at least 8
+  int min_samples = 16;  // powers of two, at least 4
   int max_samples = 1024;
   float target_error = 0;  // standard error over sqrt(mean * max(irradiance, floor_share * mean)); 0: never stops
   float floor_share = 0.25f;
