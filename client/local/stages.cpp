@@ -85,7 +85,8 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
     clock.Begin("filter");
     const int pages = static_cast<int>(prepared.texels.pages.size());
     for (int page = 0; page < pages; ++page) {
-      FilterPage(prepared.texels, page, baked.lights, baked.filter);
+      const std::vector<Seam> seams = SeamsOf(*prepared.world, prepared.texels, page, baked.lights, baked.filter);
+      FilterPage(prepared.texels, page, baked.lights, seams, baked.filter);
       progress.Report("filter", page + 1, pages);
     }
     clock.End();

@@ -8,8 +8,7 @@
 namespace bakewell {
 namespace {
 
-constexpr float kLift = 0.05f;       // height of the rays between neighbours, over their length
-constexpr float kSameFacing = 0.9f;  // least cosine between the normals of neighbours
+constexpr float kLift = 0.05f;  // height of the rays between neighbours, over their length
 // Of neighbours one of which has so many times less room above it one lies in a gap and the other outside, in other
 // light. What is more than kMostRoom texels away makes no gap; so the other of the two is crowded as well. No whole
 // ratio: levels are built on the grid that texels lie on, and rounding would decide.
@@ -29,6 +28,18 @@ float RoomAbove(const World& world, const Texel& texel, Vec3f to_neighbour, floa
 
 }  // namespace
 
+bool LiesOpen(const World& world, const Texel& a, const Texel& b, float sides, int64_t& rays) {
+  const float lift = kLift * Length(b.position - a.position);
+  const Vec3f from = a.position + a.normal * lift, way = b.position + b.normal * lift - from;
+  const float length = Length(way);
+  if (!(length > 0)) return true;
+  ++rays;
+  if (world.Occluded({from, way / length, length, 0})) return false;
+  const float room_a = RoomAbove(world, a, b.position - a.position, sides, rays);
+  const float room_b = RoomAbove(world, b, a.position - b.position, sides, rays);
+  return std::max(room_a, room_b) <= kSameRoom * std::min(room_a, room_b);
+}
+
 uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, bool crowded, int64_t& rays) {
   const Texel& a = map.texels[texel];
   const PageSize page = map.pages[a.page];
@@ -41,17 +52,8 @@ uint8_t ConnectTexel(const World& world, const TexelMap& map, uint32_t texel, bo
     if (other < 0) continue;
     const Texel& b = map.texels[other];
     if (a.chart != b.chart || Dot(a.normal, b.normal) < kSameFacing) continue;
-    const float lift = kLift * Length(b.position - a.position);
-    const Vec3f from = a.position + a.normal * lift, way = b.position + b.normal * lift - from;
-    const float length = Length(way);
-    if (crowded && length > 0) {
-      ++rays;
-      if (world.Occluded({from, way / length, length, 0})) continue;
-      const float sides = std::hypot(static_cast<float>(kNeighbours[k][0]), static_cast<float>(kNeighbours[k][1]));
-      const float room_a = RoomAbove(world, a, b.position - a.position, sides, rays);
-      const float room_b = RoomAbove(world, b, a.position - b.position, sides, rays);
-      if (std::max(room_a, room_b) > kSameRoom * std::min(room_a, room_b)) continue;
-    }
+    const float sides = std::hypot(static_cast<float>(kNeighbours[k][0]), static_cast<float>(kNeighbours[k][1]));
+    if (crowded && !LiesOpen(world, a, b, sides, rays)) continue;
     open |= static_cast<uint8_t>(1U << k);
   }
   return open;

@@ -9,10 +9,6 @@
 namespace bakewell {
 namespace {
 
-constexpr float kDeviation = 2.5f;  // of the weights by distance [texels]
-// Texels whose squared differences are on the mean as large as their variances make them count in full; where they are
-// larger by kTolerance squared of that, by 1 / e.
-constexpr float kTolerance = 0.9f;
 constexpr float kSlopeShare = 0.5f;  // of what the regression says: all of it is noisier, none of it is more biased
 constexpr float kRising = 0.6f;      // of pairs, whose weight falls where they differ more
 constexpr float kRidge = 1e-3f;      // squared texels; texels in one line give an answer too
@@ -133,11 +129,8 @@ void SimilarTexels::CompareAt(int dx, int dy, bool around) {
     const int32_t *part = &part_[Place(first_x, y)], *other_part = &part_[Place(first_x + dx, y + dy)];
     for (size_t i = 0; i < n; ++i) {
       const float square = add(squares, i), count = add(counts, i);
-      // exp(-(ratio - 1) / kTolerance^2), but for what is next to nothing.
-      const float ratio = square / std::max(count, 1.0f);
-      const float root = std::max(0.0f, 1 - std::max(0.0f, ratio - 1) * (1 / (8 * kTolerance * kTolerance)));
-      const float root2 = root * root, root4 = root2 * root2;
-      weight[i] = part[i] == other_part[i] && part[i] != 0 ? root4 * root4 * nearness : 0.0f;
+      const float like = Likeness(square / std::max(count, 1.0f));
+      weight[i] = part[i] == other_part[i] && part[i] != 0 ? like * nearness : 0.0f;
     }
     const auto keep = [&](size_t index, int row, int shift) {
       if (row < 0 || row >= height_) return;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -7,6 +9,20 @@
 #include "worker/filter/connections.h"
 
 namespace bakewell {
+
+// Texels whose squared differences are on the mean as large as their variances count in full; where they are larger by
+// kTolerance squared of that, for 1 / e.
+inline constexpr float kTolerance = 0.9f;
+// Weight by the mean of squared differences over their variances: exp(-(ratio - 1) / kTolerance^2), but for what is
+// next to nothing.
+inline float Likeness(float ratio) {
+  const float root = std::max(0.0f, 1 - std::max(0.0f, ratio - 1) * (1 / (8 * kTolerance * kTolerance)));
+  const float root2 = root * root, root4 = root2 * root2;
+  return root4 * root4;
+}
+// Weight by distance [texels].
+inline constexpr float kDeviation = 2.5f;
+inline float Nearness(float distance) { return std::exp(distance * distance / (-2 * kDeviation * kDeviation)); }
 
 // The weights that a block of texels with a noisy signal is averaged with: non-local means (Buades et al. 2005), by how
 // far texels differ beyond their noise (Rousselle et al. 2012). Two texels are alike where the 3 x 3 texels around the

@@ -19,6 +19,9 @@ namespace {
 enum class Signal : uint8_t { kIndirect, kDirect };
 
 constexpr int kBlock = 32;  // texels a side that are weighed at a time
+constexpr float kMargin = static_cast<float>(SetNoise::kMargin);
+constexpr float kOfOne = 0.4f;     // one difference varies more than a patch of them
+constexpr float kMuchNoisier = 2;  // of two variances at a seam: the noisier counts for less
 
 class PageFilter {
  public:
@@ -56,6 +59,23 @@ class PageFilter {
       filtered[texels_[k]] = true;
     }
     return std::accumulate(bias_square.begin(), bias_square.end(), 0.0);
+  }
+
+  // Along the seams, after Run of the same signal. Returns what is to be added to FilterCounters::bias_square.
+  double RunAlong(std::span<const Seam> seams, Signal signal, std::vector<bool>& filtered) {
+    signal_ = signal;
+    std::vector<std::pair<uint32_t, LightPart>> joined;
+    double bias_square = 0;
+    for (size_t begin = 0, end = 0; begin < seams.size(); begin = end) {
+      while (end < seams.size() && seams[end].texel == seams[begin].texel) ++end;
+      LightPart part;
+      if (Join(seams.subspan(begin, end - begin), part, bias_square)) joined.push_back({seams[begin].texel, part});
+    }
+    for (const auto& [texel, part] : joined) {
+      Replace(lights_[texel], part);
+      filtered[texel] = true;
+    }
+    return bias_square;
   }
 
  private:
@@ -124,7 +144,7 @@ class PageFilter {
     if (!noisy) return false;
     weights.Compare(true);
     for (const Block::Cut& cut : block.cuts) weights.CutOff(cut.x, cut.y, cut.texels);
-    weights.Regress(static_cast<float>(SetNoise::kMargin));
+    weights.Regress(kMargin);
     return true;
   }
 
@@ -223,6 +243,38 @@ class PageFilter {
     }
   }
 
+  // seams: of one texel. Its mean and those beyond its chart's border, as far as they differ by no more than their
+  // noise.
+  bool Join(std::span<const Seam> seams, LightPart& result, double& bias_square) const {
+    const TexelLight& light = lights_[seams.front().texel];
+    const float own_value = ValueOf(light), own_variance = Luminance(VarianceOf(light));
+    std::array<float, sizeof(LightPart) / sizeof(float)> sum{};  // as in Smooth
+    const PartLight own = PartOf(light);
+    std::copy(own.numbers.begin(), own.numbers.end(), sum.begin());
+    Rgb variance = own.variance;
+    float total = 1, moved = 0;
+    for (const Seam& seam : seams) {
+      const TexelLight& other = lights_[seam.other];
+      const float by = ValueOf(other) - own_value, its_variance = Luminance(VarianceOf(other));
+      if (!(own_variance > 0) || !(its_variance > 0)) continue;
+      const float weight = Likeness(kOfOne * by * by / (own_variance + its_variance)) * Nearness(seam.distance) *
+                           std::min(1.0f, kMuchNoisier * own_variance / its_variance);
+      const PartLight part = PartOf(other);
+      for (size_t k = 0; k < kWide; ++k) sum[k] += weight * part.numbers[k];
+      variance += part.variance * (weight * weight);
+      total += weight;
+      moved += weight * by;
+    }
+    if (total == 1) return false;
+    for (float& number : sum) number /= total;
+    result = std::bit_cast<LightPart>(sum);
+    result.variance = variance / (total * total);
+    moved /= total;
+    const float noise = own_variance * (1 - 2 / total) + Luminance(result.variance);
+    bias_square += static_cast<double>(moved * moved - noise / kMargin);
+    return true;
+  }
+
   void Replace(TexelLight& light, const LightPart& smooth) const {
     light.variance += smooth.variance - VarianceOf(light);
     if (signal_ == Signal::kDirect) {
@@ -249,14 +301,28 @@ class PageFilter {
 
 }  // namespace
 
-void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, FilterCounters& counters) {
+void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, std::span<const Seam> seams,
+                FilterCounters& counters) {
   std::vector<bool> filtered(lights.size(), false);
   const bool noisy = std::any_of(lights.begin(), lights.end(),
                                  [](const TexelLight& light) { return MaxComponent(light.direct_variance) > 0; });
   PageFilter filter(map, page, lights);
-  if (noisy) counters.bias_square += filter.Run(Signal::kDirect, filtered);
-  counters.bias_square += filter.Run(Signal::kIndirect, filtered);
+  for (const Signal signal : {Signal::kDirect, Signal::kIndirect}) {
+    if (signal == Signal::kDirect && !noisy) continue;
+    counters.bias_square += filter.Run(signal, filtered) + filter.RunAlong(seams, signal, filtered);
+  }
   counters.filtered += std::count(filtered.begin(), filtered.end(), true);
+}
+
+std::vector<Seam> SeamsOf(const World& world, const TexelMap& map, int page, std::span<const TexelLight> lights,
+                          FilterCounters& counters) {
+  std::vector<bool> valid;
+  std::vector<uint8_t> open;
+  for (const TexelLight& light : lights) {
+    valid.push_back(light.valid);
+    open.push_back(light.open);
+  }
+  return FindSeams(world, map, page, valid, open, counters.rays);
 }
 
 }  // namespace bakewell

@@ -286,7 +286,12 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Finish(const Work& work) {
   const size_t gathered = lights.size();
   lights.resize(texels->texels.size());
   FilterCounters filtered;
-  if (work.settings.filter) InArena([&] { FilterPage(*texels, page, lights, filtered); });
+  if (work.settings.filter) {
+    InArena([&] {
+      const std::vector<Seam> seams = SeamsOf(*level->world, *texels, page, lights, filtered);
+      FilterPage(*texels, page, lights, seams, filtered);
+    });
+  }
   if (!work.settings.no_skip.Has(Skip::kShBands)) {
     const GatherOptions asked = BudgetOf(work.settings, level->texels->texel_count()).gather;
     SkipCount dropped;

@@ -67,6 +67,7 @@ void BakeTally::Count(const GatherCounters& counters) { counters_.Add(counters);
 void BakeTally::Count(std::span<const TexelLight> lights, const FilterCounters& filter) {
   filtered_ += filter.filtered;
   bias_square_ += filter.bias_square;
+  counters_.filter_rays += filter.rays;
   texels_ += std::ssize(lights);
   for (const TexelLight& light : lights) {
     direct_samples_ += light.direct_samples;

@@ -107,7 +107,7 @@ void RegisterTexels(const KernelLevel& k) {
     std::vector<TexelLight> copy = *lights;
     FilterCounters counters;
     tbb::task_arena one(1);
-    one.execute([&] { FilterPage(*k.texels, 0, copy, counters); });
+    one.execute([&] { FilterPage(*k.texels, 0, copy, {}, counters); });
     return std::ssize(copy);
   });
   Register(k, "finish", [&k, lights] {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "tests/support/statistics.h"
 #include "worker/filter/connections.h"
 
@@ -53,7 +55,7 @@ TEST(FilterPage, SmoothsIndirectLightKeepsItsSumAndWeighsShTheSame) {
   NoisyPage page(1);
   const double before = Sum(page.lights);
   FilterCounters counters;
-  FilterPage(page.map, 0, page.lights, counters);
+  FilterPage(page.map, 0, page.lights, {}, counters);
   EXPECT_GT(counters.filtered, kSide * kSide / 2);
   EXPECT_NEAR(Sum(page.lights) / before, 1, 1e-4);
   double variance = 0, claimed = 0;
@@ -81,7 +83,7 @@ TEST(FilterPage, SmoothsNoisyDirectLightByWindowsOfItsOwn) {
   }
   const double before = Sum(page.lights);
   FilterCounters counters;
-  FilterPage(page.map, 0, page.lights, counters);
+  FilterPage(page.map, 0, page.lights, {}, counters);
   EXPECT_GT(counters.filtered, kSide * kSide / 2);
   EXPECT_NEAR(Sum(page.lights) / before, 1, 1e-4);
   double square = 0;
@@ -112,7 +114,7 @@ TEST(FilterPage, SaysHowMuchBiasItAdds) {
       light.variance = light.indirect.variance = Rgb{1, 1, 1} * (1.2f / 3);  // with the margin of the gather's reports
     }
     FilterCounters counters;
-    FilterPage(page.map, 0, page.lights, counters);
+    FilterPage(page.map, 0, page.lights, {}, counters);
     said += counters.bias_square / (kSeeds * kTexels);
     for (size_t i = 0; i < kTexels; ++i) {
       const auto value = static_cast<double>(page.lights[i].irradiance.x);
@@ -141,7 +143,7 @@ TEST(FilterPage, InvalidTexelsAreNoEvidence) {
     page.lights[i].indirect.irradiance = page.lights[i].irradiance = {1e6f, 1e6f, 1e6f};
   }
   FilterCounters counters;
-  FilterPage(page.map, 0, page.lights, counters);
+  FilterPage(page.map, 0, page.lights, {}, counters);
   for (size_t i = 0; i < page.lights.size(); ++i) {
     EXPECT_TRUE(!page.lights[i].valid || page.lights[i].irradiance.z < 100);
   }
@@ -161,7 +163,7 @@ TEST(FilterPage, LightStaysOnItsSideOfAWall) {
     light.variance = light.indirect.variance = Rgb{1, 1, 1} * 100;  // would hide the difference
   }
   FilterCounters counters;
-  FilterPage(page.map, 0, page.lights, counters);
+  FilterPage(page.map, 0, page.lights, {}, counters);
   for (size_t i = 0; i < page.lights.size(); ++i) {
     const Texel& texel = page.map.texels[i];
     if (texel.x > kEnd - kWindowRadius) continue;  // its window does not see the wall's end
@@ -169,6 +171,42 @@ TEST(FilterPage, LightStaysOnItsSideOfAWall) {
   }
   const TexelLight& beyond = page.lights[11 * kSide + kSide - 1];
   EXPECT_GT(beyond.irradiance.y, 1.5f);
+}
+
+// The page is two charts, columns 0 to 11 and the rest, whose surface goes on from the one to the other; the right
+// one's light is `right` times the left one's. Returns the mean step between the charts.
+double StepAfterJoining(float right, bool joined) {
+  NoisyPage page(1);
+  std::vector<Seam> seams;
+  for (uint32_t i = 0; i < page.lights.size(); ++i) {
+    Texel& texel = page.map.texels[i];
+    TexelLight& light = page.lights[i];
+    texel.chart = texel.x < 12 ? 0 : 1;
+    if (texel.x == 11) light.open &= 4;
+    if (texel.x == 12) light.open &= static_cast<uint8_t>(~8);
+    if (texel.chart == 1) light.irradiance = light.indirect.irradiance = light.indirect.irradiance * right;
+    if (texel.x >= 8 && texel.x < 16) {
+      const uint32_t other = i + static_cast<uint32_t>((texel.x < 12 ? 12 : 11) - texel.x);
+      seams.push_back({i, other, static_cast<float>(std::abs(static_cast<int>(other) - static_cast<int>(i)))});
+    }
+  }
+  FilterCounters counters;
+  FilterPage(page.map, 0, page.lights, joined ? std::span<const Seam>(seams) : std::span<const Seam>(), counters);
+  double step = 0;
+  for (int y = 0; y < kSide; ++y) {
+    const auto at = [&](int x) { return page.lights[static_cast<size_t>(y * kSide + x)].indirect.irradiance.y; };
+    step += static_cast<double>(std::abs(at(12) - at(11)) / kSide);
+  }
+  return step;
+}
+
+// Symptom: the pieces of a modular floor could be told apart by their noise.
+TEST(FilterPage, NoiseMakesNoStepsBetweenCharts) {
+  EXPECT_LT(StepAfterJoining(1, true), 0.5 * StepAfterJoining(1, false));
+}
+
+TEST(FilterPage, StepsOfLightBetweenChartsStay) {
+  EXPECT_GT(StepAfterJoining(8, true), 0.9 * StepAfterJoining(8, false));
 }
 
 }  // namespace
