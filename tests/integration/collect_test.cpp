@@ -47,7 +47,7 @@ TEST_F(CollectTest, KeepsWhatALiveJobNeeds) {
   Farm farm(options);
   auto& worker = farm.AddWorker("w");
   SyntheticScene scene;
-  farm.Bake(scene);
+  const v1::Job first = farm.Bake(scene);
   scene.seed = 9;
   scene.work_us = 50'000;
   const auto client = farm.Client();
@@ -59,7 +59,9 @@ TEST_F(CollectTest, KeepsWhatALiveJobNeeds) {
   const auto ended = client->Watch(job->job_id(), [](const v1::Job&) { return true; });
   EXPECT_EQ(ended->state(), v1::DONE);
   EXPECT_EQ(worker.worker->counters().failed, 0);
-  const int64_t done = worker.worker->counters().done;
+  const int64_t done = first.tasks_done() + ended->tasks_done();
+  // A worker counts a task after the coordinator does.
+  EXPECT_TRUE(WaitFor([&] { return worker.worker->counters().done == done; }));
   farm.Bake(scene);
   EXPECT_EQ(worker.worker->counters().done, done) << "what had been done before was forgotten";
 }

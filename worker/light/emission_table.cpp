@@ -52,7 +52,7 @@ int EmissionTable::LargestSide(std::span<const int> sides, size_t bytes) {
     size_t sum = 0;
     for (const int side : sides) {
       const auto n = static_cast<size_t>(std::min(side, largest) + 1);
-      sum += n * (n * (sizeof(double) + 1) + sizeof(Distribution1D) + 64);  // numbers; what a row takes besides
+      sum += n * (n * (sizeof(uint32_t) + 1) + sizeof(Distribution1D) + 64);  // numbers; what a row takes besides
     }
     if (sum <= bytes) return largest;
   }

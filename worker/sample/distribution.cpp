@@ -3,44 +3,63 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <numeric>
 
 #include "core/base/check.h"
 
 namespace bakewell {
 
-Distribution1D::Distribution1D(std::span<const float> weights) : cdf_(weights.size() + 1) {
+Distribution1D::Distribution1D(std::span<const float> weights) : size_(static_cast<int>(weights.size())) {
   BAKEWELL_CHECK(!weights.empty());
-  for (size_t i = 0; i < weights.size(); ++i) cdf_[i + 1] = cdf_[i] + static_cast<double>(weights[i]);
-  total_ = cdf_.back();
-  for (size_t i = 1; i < cdf_.size(); ++i) {
-    cdf_[i] = total_ > 0 ? cdf_[i] / total_ : static_cast<double>(i) / static_cast<double>(weights.size());
+  thread_local std::vector<double> sums;  // before each
+  sums.resize(weights.size());
+  for (size_t i = 0; i < weights.size(); ++i) {
+    sums[i] = total_;
+    total_ += static_cast<double>(weights[i]);
   }
-  cdf_.back() = 1;
+  size_t count = weights.size();
+  if (total_ > 0) {
+    while (!(weights[count - 1] > 0)) --count;
+  } else {
+    std::iota(sums.begin(), sums.end(), 0.0);
+  }
+  const auto has_weight = [&](size_t i) { return weights[i] > 0 || !(total_ > 0) ? 1 : 0; };
+  const double scale = static_cast<double>(kOne) / (total_ > 0 ? total_ : static_cast<double>(count));
+  cdf_.resize(count);
+  int64_t begin = 0;
+  for (size_t i = 1; i < count; ++i) {
+    begin = std::max(begin + has_weight(i - 1), static_cast<int64_t>(sums[i] * scale + 0.5));
+    cdf_[i] = static_cast<uint32_t>(std::min<int64_t>(begin, kOne - 1));
+  }
+  // Room for the last ones.
+  for (size_t i = count - 1; i-- > 0;) {
+    const uint32_t most = cdf_[i + 1] - static_cast<uint32_t>(has_weight(i));
+    if (cdf_[i] <= most && cdf_[i] < kOne - 1) break;
+    cdf_[i] = std::min(cdf_[i], most);
+  }
   constexpr size_t kFew = 16, kPerStart = 8;
-  if (weights.size() <= kFew || weights.size() > std::numeric_limits<uint16_t>::max()) return;
-  begin_.resize(std::bit_floor(weights.size() / kPerStart));  // u times a power of two is exact
+  if (count <= kFew || count > std::numeric_limits<uint16_t>::max()) return;
+  begin_.resize(std::bit_floor(count / kPerStart));  // u times a power of two is exact
   uint16_t cell = 0;
   for (size_t i = 0; i < begin_.size(); ++i) {
-    while (cdf_[cell + 1] <= static_cast<double>(i) / static_cast<double>(begin_.size())) ++cell;
+    while (cell + size_t{1} < count && cdf_[cell + 1] <= i * (kOne / begin_.size())) ++cell;
     begin_[i] = cell;
   }
 }
 
 Distribution1D::Sample Distribution1D::Draw(float u) const {
-  int index = 0;
+  const auto at = static_cast<uint64_t>(static_cast<double>(u) * static_cast<double>(kOne));
+  size_t index = 0;
   if (begin_.empty()) {
-    const auto above = std::upper_bound(cdf_.begin(), cdf_.end() - 1, static_cast<double>(u));
-    index = std::max(0, static_cast<int>(above - cdf_.begin()) - 1);
+    index = static_cast<size_t>(std::upper_bound(cdf_.begin() + 1, cdf_.end(), at) - cdf_.begin()) - 1;
   } else {
-    index = begin_[static_cast<size_t>(u * static_cast<float>(begin_.size()))];
+    index = begin_[static_cast<size_t>(at * begin_.size() / kOne)];
+    while (index + 1 < cdf_.size() && cdf_[index + 1] <= at) ++index;
   }
-  while (index + 1 < size() && cdf_[index + 1] <= static_cast<double>(u)) ++index;
-  // Cells whose probability is zero, or so small that single precision has no number for it, are not drawn.
-  while (index > 0 && Probability(index) <= 0) --index;
-  while (index + 1 < size() && Probability(index) <= 0) ++index;
-  const double probability = cdf_[index + 1] - cdf_[index];
-  const double remainder = probability > 0 ? (static_cast<double>(u) - cdf_[index]) / probability : 0.0;
-  return {index, static_cast<float>(probability), std::clamp(static_cast<float>(remainder), 0.0f, 0x1.fffffep-1f)};
+  const auto width = static_cast<double>(Width(index));
+  const double remainder = static_cast<double>(at - cdf_[index]) / width;
+  return {static_cast<int>(index), Probability(static_cast<int>(index)),
+          std::clamp(static_cast<float>(remainder), 0.0f, 0x1.fffffep-1f)};
 }
 
 Distribution2D::Distribution2D(int width, int height, std::span<const float> weights) : width_(width), height_(height) {

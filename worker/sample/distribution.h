@@ -21,15 +21,24 @@ class Distribution1D {
     float remainder = 0;    // u within the cell, uniform in [0, 1) again
   };
   Sample Draw(float u) const;
-  float Probability(int index) const { return static_cast<float>(cdf_[index + 1] - cdf_[index]); }
-  int size() const { return static_cast<int>(cdf_.size()) - 1; }
+  float Probability(int index) const { return static_cast<float>(Width(static_cast<size_t>(index))) * 0x1p-32f; }
+  int size() const { return size_; }
   double total() const { return total_; }  // sum of the weights
 
  private:
-  std::vector<double> cdf_{0, 1};
+  static constexpr uint64_t kOne = uint64_t{1} << 32;
+  uint64_t Width(size_t cell) const {
+    if (cell >= cdf_.size()) return 0;
+    return (cell + 1 < cdf_.size() ? cdf_[cell + 1] : kOne) - cdf_[cell];
+  }
+
+  // Where each cell begins, up to the last that has any weight [2^-32]. What has weight is one such part wide at least:
+  // it can be drawn, however little it is.
+  std::vector<uint32_t> cdf_{0};
   // Where the search for u in [i, i + 1) / size begins: the last cell that begins at i / size or before. Empty for few,
   // and for more than it can tell.
   std::vector<uint16_t> begin_;
+  int size_ = 1;
   double total_ = 0;
 };
 

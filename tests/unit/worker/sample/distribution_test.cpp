@@ -52,6 +52,26 @@ TEST(Distribution1D, SurvivesWeightsFarApart) {
   for (const float u : {0.0f, 0.5f, kLast}) EXPECT_GT(distribution.Draw(u).probability, 0);
 }
 
+// Whatever may be drawn is known to be as likely as it is drawn, and what has weight may be.
+TEST(Distribution1D, LosesNoWeightAndCountsAllThatItDraws) {
+  for (const std::vector<float>& weights :
+       {std::vector<float>{1e30f, 1e-30f, 0, 1e-30f}, {0, 1e-38f, 0}, {1, 0x1p-31f, 0x1p-33f, 0, 0x1p-40f, 0x1p-40f}}) {
+    const Distribution1D distribution(weights);
+    double sum = 0;
+    for (size_t i = 0; i < weights.size(); ++i) {
+      const auto probability = static_cast<double>(distribution.Probability(static_cast<int>(i)));
+      EXPECT_EQ(probability > 0, weights[i] > 0) << i;
+      sum += probability;
+    }
+    EXPECT_NEAR(sum, 1, 1e-7);
+    EXPECT_EQ(distribution.size(), static_cast<int>(weights.size()));
+  }
+  const Distribution1D distribution(std::vector<float>{1e-30f, 1, 0});
+  EXPECT_EQ(distribution.Draw(0).index, 0);
+  EXPECT_EQ(distribution.Draw(0).probability, 0x1p-32f);
+  EXPECT_EQ(distribution.Draw(0x1p-32f).index, 1);
+}
+
 TEST(Distribution1D, AllZeroIsUniform) {
   const Distribution1D distribution(std::vector<float>(4, 0.0f));
   for (int i = 0; i < 4; ++i) {
