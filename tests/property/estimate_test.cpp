@@ -179,5 +179,58 @@ TEST(Convergence, TexelsPartlyInsideOtherGeometryDoNotMissTheSun) {
   EXPECT_GT(divided, 100);
 }
 
+// The floor of a room: 4 x 4 pieces of 2 x 2 m and 8 x 8 texels, each a chart of its own. Element 32 y + x: irradiance
+// of the floor's texel.
+std::vector<double> ModularFloor(int samples, uint32_t seed) {
+  constexpr int kPieces = 4, kTexels = 8;
+  SceneBuilder builder({64, 64});
+  const int lamp = builder.AddMaterial(Rgb{0, 0, 0}, Rgb{8, 8, 8});
+  builder.AddRoom({0, -0.5, -8}, {8, 3, 0}, {.lightmapped = false});
+  builder.AddBox({2.5, 0, -3.5}, {3.5, 1, -2.5}, {.lightmapped = false});
+  builder.AddQuad({5, 2.9, -6}, {1, 0, 0}, {0, 0, 1}, {.material = lamp, .lightmapped = false});
+  for (int x = 0; x < kPieces; ++x) {
+    for (int y = 0; y < kPieces; ++y) {
+      const PageRect rect{2.0f + 16.0f * static_cast<float>(x), 2.0f + 16.0f * static_cast<float>(y), kTexels, kTexels};
+      builder.AddQuad({2.0 * x, 0, -2.0 * y}, {2, 0, 0}, {0, 0, -2}, {.page = rect});
+    }
+  }
+  BakeSettings settings;
+  settings.min_samples = settings.max_samples = samples;
+  settings.photons = 100000;
+  settings.seed = seed;
+  const BakedScene baked = BakeSceneInMemory(builder.Build(), settings);
+  constexpr int kSide = kPieces * kTexels;
+  std::vector<double> floor(kSide * kSide);
+  const Vec3f origin = baked.texels().front().position;
+  for (size_t i = 0; i < baked.texels().size(); ++i) {
+    const Vec3f place = (baked.texels()[i].position - origin) * 4.0f;
+    const auto x = static_cast<size_t>(place.x + 0.5f), y = static_cast<size_t>(0.5f - place.z);
+    floor[y * kSide + x] = static_cast<double>(Luminance(baked.lights()[i].irradiance));
+  }
+  return floor;
+}
+
+// Symptom: the pieces of a modular floor could be told apart at preview.
+TEST(Convergence, PiecesOfAFloorLookLikeOne) {
+  constexpr size_t kSide = 32, kPiece = 8;
+  const std::vector<double> limit = ModularFloor(1024, 0);
+  double between = 0, within = 0;
+  int between_count = 0, within_count = 0;
+  for (uint32_t seed = 1; seed <= 4; ++seed) {
+    std::vector<double> error = ModularFloor(4, seed);
+    for (size_t i = 0; i < error.size(); ++i) error[i] -= limit[i];
+    for (size_t y = 0; y < kSide; ++y) {
+      for (size_t x = 1; x < kSide; ++x) {
+        for (const double step :
+             {error[y * kSide + x] - error[y * kSide + x - 1], error[x * kSide + y] - error[(x - 1) * kSide + y]}) {
+          (x % kPiece == 0 ? between : within) += step * step;
+          (x % kPiece == 0 ? between_count : within_count) += 1;
+        }
+      }
+    }
+  }
+  EXPECT_LT(between / between_count, 2.5 * within / within_count);  // 3.0 where charts keep to themselves
+}
+
 }  // namespace
 }  // namespace bakewell
