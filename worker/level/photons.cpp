@@ -14,6 +14,7 @@ namespace {
 constexpr int64_t kPilot = 32768, kNextPilot = 8, kMostPilot = 262144;  // photons
 constexpr int64_t kWorthAPilot = 4;                                     // times its photons may be needed
 constexpr int64_t kTrusted = 16;  // times its photons a pilot may ask for; else a larger one is asked
+constexpr double kFarBeyond = 2;  // times the most photons there are: no larger pilot would ask for fewer
 constexpr size_t kPilotPoints = 512;
 constexpr double kPhotonShare = 0.35;  // of the target error
 constexpr double kSetShare = 0.3;      // of the samples that independent rays would need: sets, filter and guide
@@ -122,7 +123,7 @@ int64_t PhotonsFor(const PhotonScene& scene, const BakeSettings& settings, const
        pilot *= kNextPilot) {
     needed = Needed(FlyPilot(scene, settings, budget.gather.floor_share, pilot, progress), budget.gather, scene.texels);
     if (progress.Cancelled()) return 0;
-    if (needed <= static_cast<double>(kTrusted * pilot)) break;
+    if (needed <= static_cast<double>(kTrusted * pilot) || needed > kFarBeyond * most) break;
   }
   // What is no number (light beyond what floats hold) is no reason for few.
   if (!(needed < most)) return budget.most_photons;
