@@ -20,7 +20,8 @@ constexpr float kTouching = 1.5f;   // sides of the larger of two texels between
 constexpr float kSameSize = 2;      // of the sides of two texels
 constexpr float kOffPlane = 0.35f;  // of the way between two texels: what it may rise over either's surface
 constexpr float kApart = 0.05f;     // sides; nearer texels cover the same place
-constexpr int kCellSides = 16;      // of a texel, those of a cell of the index
+constexpr int kCellSides = 8;       // of a texel, those of a cell of the index
+constexpr int kMostVisited = 2048;  // texels near one; where there are more, charts lie upon each other
 
 struct Seams {
   std::array<Seam, kMostSeams> of;
@@ -45,15 +46,19 @@ struct Seams {
 
 float SideOf(const Texel& texel) { return std::sqrt(texel.area / std::max(texel.coverage, 1e-6f)); }
 
+// A side that can be compared.
+bool IsUsable(float side) { return side > 0 && std::isfinite(side); }
+
 // The texels at charts' borders by where they are: cells of a size that goes with theirs.
 class BorderIndex {
  public:
+  // border: texels of usable sides.
   BorderIndex(const TexelMap& map, std::vector<uint32_t> border) : map_(map), border_(std::move(border)) {
-    for (size_t i = 0; i < border_.size(); ++i) {
-      const Texel& texel = map_.texels[border_[i]];
-      const int size = SizeOf(SideOf(texel));
+    for (const uint32_t i : border_) {
+      const Texel& texel = map_.texels[i];
+      const int size = std::ilogb(SideOf(texel));
       sizes_.push_back(size);
-      cells_[KeyOf(size, CellOf(texel.position, size))].push_back(border_[i]);
+      cells_[KeyOf(size, CellOf(texel.position, size))].push_back(i);
     }
     std::sort(sizes_.begin(), sizes_.end());
     sizes_.erase(std::unique(sizes_.begin(), sizes_.end()), sizes_.end());
@@ -61,11 +66,12 @@ class BorderIndex {
 
   const std::vector<uint32_t>& border() const { return border_; }
 
-  // Texels that may lie within kTouching of `texel` and be of about its size, and others.
+  // Texels that may lie within kTouching of `texel` and be of about its size, and others; kMostVisited at most.
   template <typename Visit>
   void VisitNear(const Texel& texel, Visit visit) const {
     const float side = SideOf(texel);
-    const int of_texel = SizeOf(side);
+    const int of_texel = std::ilogb(side);
+    int visited = 0;
     for (const int size : sizes_) {
       if (std::abs(size - of_texel) > 1) continue;
       const float reach = kTouching * std::max(side, std::ldexp(1.0f, size + 1));
@@ -76,7 +82,10 @@ class BorderIndex {
           for (int64_t z = low[2]; z <= high[2]; ++z) {
             const auto found = cells_.find(KeyOf(size, {x, y, z}));
             if (found == cells_.end()) continue;
-            for (const uint32_t other : found->second) visit(other);
+            for (const uint32_t other : found->second) {
+              if (++visited > kMostVisited) return;
+              visit(other);
+            }
           }
         }
       }
@@ -84,12 +93,13 @@ class BorderIndex {
   }
 
  private:
+  // Of texels with sides of [2^size, 2^(size + 1)).
   using Cell = std::array<int64_t, 3>;
-  // Texels have sides of [2^size, 2^(size + 1)).
-  static int SizeOf(float side) { return side > 0 ? std::ilogb(side) : 0; }
   static Cell CellOf(Vec3f position, int size) {
     const double scale = std::ldexp(1.0, -size) / kCellSides;
-    const auto cell = [scale](float at) { return static_cast<int64_t>(std::floor(static_cast<double>(at) * scale)); };
+    const auto cell = [scale](float at) {
+      return static_cast<int64_t>(std::clamp(std::floor(static_cast<double>(at) * scale), -0x1p60, 0x1p60));
+    };
     return {cell(position.x), cell(position.y), cell(position.z)};
   }
   static uint64_t KeyOf(int size, const Cell& cell) {
@@ -111,14 +121,18 @@ class SeamFinder {
  public:
   SeamFinder(const World& world, const TexelMap& map, int page, const std::vector<bool>& valid,
              std::span<const uint8_t> open)
-      : world_(world), map_(map), page_(page), valid_(valid), open_(open), seams_(map.texels.size()) {}
+      : world_(world), map_(map), page_(page), valid_(valid), open_(open), place_(map.texels.size(), -1) {}
 
   std::vector<Seam> Run(int64_t& rays) {
     const BorderIndex index(map_, Border());
     std::vector<uint32_t> ring = Match(index, rays);
     for (int step = 0; step < kSeamReach; ++step) ring = Spread(ring);
     std::vector<Seam> result;
-    for (const Seams& seams : seams_) result.insert(result.end(), seams.of.begin(), seams.of.begin() + seams.count);
+    for (const int32_t place : place_) {
+      if (place < 0) continue;
+      const Seams& seams = seams_[static_cast<size_t>(place)];
+      result.insert(result.end(), seams.of.begin(), seams.of.begin() + seams.count);
+    }
     return result;
   }
 
@@ -135,7 +149,7 @@ class SeamFinder {
     std::vector<uint32_t> border;
     for (uint32_t i = 0; i < map_.texels.size(); ++i) {
       const Texel& texel = map_.texels[i];
-      if (texel.page != page_ || !valid_[i]) continue;
+      if (texel.page != page_ || !valid_[i] || !IsUsable(SideOf(texel))) continue;
       for (size_t k = 0; k < kNeighbours.size(); ++k) {
         const int32_t other = Neighbour(texel, k);
         if (other >= 0 && map_.texels[other].chart == texel.chart) continue;
@@ -149,7 +163,8 @@ class SeamFinder {
   // Returns the texels at a seam.
   std::vector<uint32_t> Match(const BorderIndex& index, int64_t& rays) {
     std::atomic<int64_t> all_rays{0};
-    tbb::parallel_for(size_t{0}, index.border().size(), [&](size_t i) {
+    std::vector<Seams> open(index.border().size());
+    tbb::parallel_for(size_t{0}, open.size(), [&](size_t i) {
       const uint32_t at = index.border()[i];
       const Texel& texel = map_.texels[at];
       Seams near;
@@ -160,16 +175,26 @@ class SeamFinder {
       int64_t own_rays = 0;
       for (size_t k = 0; k < near.count; ++k) {
         const Seam& seam = near.of[k];
-        if (LiesOpen(world_, texel, map_.texels[seam.other], seam.distance, own_rays)) seams_[at].Add(map_, seam);
+        if (LiesOpen(world_, texel, map_.texels[seam.other], seam.distance, own_rays)) open[i].Add(map_, seam);
       }
       all_rays += own_rays;
     });
     rays += all_rays;
     std::vector<uint32_t> matched;
-    for (const uint32_t at : index.border()) {
-      if (seams_[at].count > 0) matched.push_back(at);
+    for (size_t i = 0; i < open.size(); ++i) {
+      if (open[i].count == 0) continue;
+      matched.push_back(index.border()[i]);
+      SeamsOf(index.border()[i]) = open[i];
     }
     return matched;
+  }
+
+  Seams& SeamsOf(uint32_t texel) {
+    if (place_[texel] < 0) {
+      place_[texel] = static_cast<int32_t>(seams_.size());
+      seams_.emplace_back();
+    }
+    return seams_[static_cast<size_t>(place_[texel])];
   }
 
   // In sides of a; 0 where b is not how a's surface goes on.
@@ -188,24 +213,24 @@ class SeamFinder {
   // To the neighbours that have no seams yet; returns these.
   std::vector<uint32_t> Spread(const std::vector<uint32_t>& ring) {
     std::vector<uint32_t> next;
-    std::vector<std::pair<uint32_t, Seam>> found;
+    std::vector<Seam> found;
     for (const uint32_t from : ring) {
+      const Seams known = SeamsOf(from);
       for (size_t k = 0; k < kNeighbours.size(); ++k) {
         const int32_t at = Neighbour(map_.texels[from], k);
-        if (at < 0 || !AreConnected(from, static_cast<uint32_t>(at), k)) continue;
-        const auto to = static_cast<uint32_t>(at);
-        if (seams_[to].count > 0) continue;
-        const Texel& texel = map_.texels[to];
+        if (at < 0 || place_[at] >= 0 || !AreConnected(from, static_cast<uint32_t>(at), k)) continue;
+        const Texel& texel = map_.texels[at];
         const float side = SideOf(texel);
-        for (size_t s = 0; s < seams_[from].count; ++s) {
-          const uint32_t other = seams_[from].of[s].other;
-          found.push_back({to, {to, other, Length(map_.texels[other].position - texel.position) / side}});
+        for (size_t s = 0; IsUsable(side) && s < known.count; ++s) {
+          const uint32_t other = known.of[s].other;
+          const float distance = Length(map_.texels[other].position - texel.position) / side;
+          found.push_back({static_cast<uint32_t>(at), other, distance});
         }
       }
     }
-    for (const auto& [to, seam] : found) {
-      if (seams_[to].count == 0) next.push_back(to);
-      seams_[to].Add(map_, seam);
+    for (const Seam& seam : found) {
+      if (place_[seam.texel] < 0) next.push_back(seam.texel);
+      SeamsOf(seam.texel).Add(map_, seam);
     }
     return next;
   }
@@ -220,7 +245,8 @@ class SeamFinder {
   const int page_;
   const std::vector<bool>& valid_;
   const std::span<const uint8_t> open_;
-  std::vector<Seams> seams_;  // one element a texel
+  std::vector<int32_t> place_;  // one element a texel: in seams_, or -1
+  std::vector<Seams> seams_;
 };
 
 }  // namespace
