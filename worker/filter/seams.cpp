@@ -184,12 +184,13 @@ class SeamFinder {
     for (size_t i = 0; i < open.size(); ++i) {
       if (open[i].count == 0) continue;
       matched.push_back(index.border()[i]);
-      SeamsOf(index.border()[i]) = open[i];
+      At(index.border()[i]) = open[i];
     }
     return matched;
   }
 
-  Seams& SeamsOf(uint32_t texel) {
+  // Makes room where there is none.
+  Seams& At(uint32_t texel) {
     if (place_[texel] < 0) {
       place_[texel] = static_cast<int32_t>(seams_.size());
       seams_.emplace_back();
@@ -215,7 +216,7 @@ class SeamFinder {
     std::vector<uint32_t> next;
     std::vector<Seam> found;
     for (const uint32_t from : ring) {
-      const Seams known = SeamsOf(from);
+      const Seams known = At(from);
       for (size_t k = 0; k < kNeighbours.size(); ++k) {
         const int32_t at = Neighbour(map_.texels[from], k);
         if (at < 0 || place_[at] >= 0 || !AreConnected(from, static_cast<uint32_t>(at), k)) continue;
@@ -230,7 +231,7 @@ class SeamFinder {
     }
     for (const Seam& seam : found) {
       if (place_[seam.texel] < 0) next.push_back(seam.texel);
-      SeamsOf(seam.texel).Add(map_, seam);
+      At(seam.texel).Add(map_, seam);
     }
     return next;
   }

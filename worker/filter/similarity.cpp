@@ -21,7 +21,7 @@ const std::array<float, kWindow>& NearnessTable() {
     std::array<float, kWindow> t{};
     for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
       for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
-        t[WindowIndex(dx, dy)] = std::exp(static_cast<float>(dx * dx + dy * dy) / (-2 * kDeviation * kDeviation));
+        t[WindowIndex(dx, dy)] = bakewell::Nearness(static_cast<float>(dx * dx + dy * dy));
       }
     }
     return t;

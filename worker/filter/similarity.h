@@ -20,9 +20,9 @@ inline float Likeness(float ratio) {
   const float root2 = root * root, root4 = root2 * root2;
   return root4 * root4;
 }
-// Weight by distance [texels].
+// Weight by the square of the distance [texels].
 inline constexpr float kDeviation = 2.5f;
-inline float Nearness(float distance) { return std::exp(distance * distance / (-2 * kDeviation * kDeviation)); }
+inline float Nearness(float distance_square) { return std::exp(distance_square / (-2 * kDeviation * kDeviation)); }
 
 // The weights that a block of texels with a noisy signal is averaged with: non-local means (Buades et al. 2005), by how
 // far texels differ beyond their noise (Rousselle et al. 2012). Two texels are alike where the 3 x 3 texels around the

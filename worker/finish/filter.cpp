@@ -64,18 +64,22 @@ class PageFilter {
   // Along the seams, after Run of the same signal. Returns what is to be added to FilterCounters::bias_square.
   double RunAlong(std::span<const Seam> seams, Signal signal, std::vector<bool>& filtered) {
     signal_ = signal;
-    std::vector<std::pair<uint32_t, LightPart>> joined;
-    double bias_square = 0;
+    std::vector<std::span<const Seam>> of_texel;
     for (size_t begin = 0, end = 0; begin < seams.size(); begin = end) {
       while (end < seams.size() && seams[end].texel == seams[begin].texel) ++end;
-      LightPart part;
-      if (Join(seams.subspan(begin, end - begin), part, bias_square)) joined.push_back({seams[begin].texel, part});
+      of_texel.push_back(seams.subspan(begin, end - begin));
     }
-    for (const auto& [texel, part] : joined) {
-      Replace(lights_[texel], part);
-      filtered[texel] = true;
+    std::vector<LightPart> joined(of_texel.size());
+    std::vector<uint8_t> changed(of_texel.size(), 0);
+    std::vector<double> bias_square(of_texel.size(), 0);
+    tbb::parallel_for(size_t{0}, of_texel.size(),
+                      [&](size_t k) { changed[k] = Join(of_texel[k], joined[k], bias_square[k]) ? 1 : 0; });
+    for (size_t k = 0; k < of_texel.size(); ++k) {
+      if (changed[k] == 0) continue;
+      Replace(lights_[of_texel[k].front().texel], joined[k]);
+      filtered[of_texel[k].front().texel] = true;
     }
-    return bias_square;
+    return std::accumulate(bias_square.begin(), bias_square.end(), 0.0);
   }
 
  private:
@@ -257,7 +261,8 @@ class PageFilter {
       const TexelLight& other = lights_[seam.other];
       const float by = ValueOf(other) - own_value, its_variance = Luminance(VarianceOf(other));
       if (!(own_variance > 0) || !(its_variance > 0)) continue;
-      const float weight = Likeness(kOfOne * by * by / (own_variance + its_variance)) * Nearness(seam.distance) *
+      const float weight = Likeness(kOfOne * by * by / (own_variance + its_variance)) *
+                           Nearness(seam.distance * seam.distance) *
                            std::min(1.0f, kMuchNoisier * own_variance / its_variance);
       const PartLight part = PartOf(other);
       for (size_t k = 0; k < kWide; ++k) sum[k] += weight * part.numbers[k];
@@ -271,7 +276,7 @@ class PageFilter {
     result.variance = variance / (total * total);
     moved /= total;
     const float noise = own_variance * (1 - 2 / total) + Luminance(result.variance);
-    bias_square += static_cast<double>(moved * moved - noise / kMargin);
+    bias_square = static_cast<double>(moved * moved - noise / kMargin);
     return true;
   }
 

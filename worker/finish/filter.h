@@ -17,9 +17,10 @@ struct FilterCounters {
 };
 
 // Smooths the direct and the indirect light of one page's texels, each by weights of its own
-// (worker/filter/similarity.h), never with invalid ones, and then, along `seams`, across charts' borders; elements as
-// in TexelMap::texels, of which those of other pages are left alone. Irradiance and all SH coefficients get the same
-// weights, and every chart keeps its sum, so that what is smoothed away is not lost.
+// (worker/filter/similarity.h), never with invalid ones; elements as in TexelMap::texels, of which those of other pages
+// are left alone. Irradiance and all SH coefficients get the same weights, and every chart keeps its sum, so that what
+// is smoothed away is not lost. Then, along `seams`, sorted by texel, light is averaged across charts' borders, where
+// charts exchange light and their sums are no longer kept one by one. Uses TBB.
 void FilterPage(const TexelMap& map, int page, std::span<TexelLight> lights, std::span<const Seam> seams,
                 FilterCounters& counters);
 
