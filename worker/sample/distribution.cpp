@@ -64,12 +64,13 @@ Distribution1D::Sample Distribution1D::Draw(float u) const {
 
 Distribution2D::Distribution2D(int width, int height, std::span<const float> weights) : width_(width), height_(height) {
   BAKEWELL_CHECK_OP(weights.size(), ==, static_cast<size_t>(width) * static_cast<size_t>(height));
+  constexpr double kMostTotal = std::numeric_limits<float>::max();
   std::vector<float> row_totals;
   rows_.reserve(static_cast<size_t>(height));
   for (int y = 0; y < height; ++y) {
     rows_.emplace_back(
         weights.subspan(static_cast<size_t>(y) * static_cast<size_t>(width), static_cast<size_t>(width)));
-    row_totals.push_back(static_cast<float>(rows_.back().total()));
+    row_totals.push_back(static_cast<float>(std::min(rows_.back().total(), kMostTotal)));
   }
   marginal_ = Distribution1D(row_totals);
 }

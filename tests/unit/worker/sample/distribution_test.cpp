@@ -108,6 +108,12 @@ TEST(Distribution2D, DrawsInProportionToWeightsUniformlyInCells) {
   EXPECT_LT(ChiSquareOf(observed, expected).Z(), 4);
 }
 
+// Finite weights whose rows add up to more than a float holds.
+TEST(Distribution2D, SurvivesTheLargestWeights) {
+  const Distribution2D distribution(2, 2, std::vector<float>(4, 3e38f));
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(distribution.Pdf(i % 2, i / 2), 1, 1e-6f);
+}
+
 TEST(Distribution1D, ManyCellsAreFoundAsIfSearchedOneByOne) {
   TestRandom random(3);
   for (const size_t cells : {17, 64, 1000, 70000}) {
