@@ -12,14 +12,32 @@ constexpr double kWorthSparing = 0.5;  // errors below gain too little
 
 constexpr float kChartsShare = 0.1f;  // of what a texel's variance is taken to be, the rest its neighbourhood's
 
+// A claim's cost is what its samples so far have cost.
+double Room(const Demand& demand) {
+  double room = demand.ceiling;
+  for (const Claim& claim : demand.claims) room -= static_cast<double>(claim.cost);
+  return room;
+}
+
+bool MayGoOn(const Claim& claim, double room) {
+  if (!(claim.error > 0)) return false;
+  return claim.doublings > 0 || (claim.further > 0 && static_cast<double>(claim.cost) <= room);
+}
+
+// Beyond what one texel may have, what can get no more samples is nobody else's to make up for.
+double Counted(const Claim& claim, double room) {
+  const double error = static_cast<double>(claim.weight) * static_cast<double>(claim.error);
+  return MayGoOn(claim, room) ? error : std::min(error, 1.0);
+}
+
 }  // namespace
 
-std::vector<bool> Allot(std::span<const Claim> claims, size_t texels, double& spare) {
+std::vector<bool> Allot(const Demand& demand, double& spare) {
   struct Next {
-    double error, cost;
-    int doublings;
+    double error, worst, cost;  // error: in the sum; beyond `worst` it is urgent
+    int doublings, further;
     size_t claim;
-    bool Urgent() const { return error > static_cast<double>(kWorst * kWorst); }
+    bool Urgent() const { return doublings > 0 && error > worst; }
     // The last of a heap is granted first.
     bool operator<(const Next& other) const {
       if (Urgent() != other.Urgent()) return other.Urgent();
@@ -27,28 +45,40 @@ std::vector<bool> Allot(std::span<const Claim> claims, size_t texels, double& sp
       return gain != other_gain ? gain < other_gain : claim > other.claim;
     }
   };
+  const std::vector<Claim>& claims = demand.claims;
   std::vector<bool> granted(claims.size(), false);
-  double sum = 0;
+  double sum = 0, room = Room(demand);
   std::vector<Next> heap;
   for (size_t i = 0; i < claims.size(); ++i) {
-    const auto error = static_cast<double>(claims[i].error);
-    // Beyond what one texel may have, what can get no more samples is nobody else's to make up for.
-    sum += claims[i].doublings > 0 ? error : std::min(error, 1.0);
-    if (claims[i].doublings > 0 && error > 0) heap.push_back({error, claims[i].cost, claims[i].doublings, i});
+    const Claim& claim = claims[i];
+    sum += Counted(claim, room);
+    const auto weight = static_cast<double>(claim.weight);
+    if (MayGoOn(claim, room)) {
+      heap.push_back({weight * static_cast<double>(claim.error), weight * static_cast<double>(kWorst * kWorst),
+                      claim.cost, claim.doublings, claim.further, i});
+    }
   }
   std::make_heap(heap.begin(), heap.end());
   // All doublings that the whole will take, as far as can be told: who has none of them waits.
-  const double allowed = static_cast<double>(texels);
+  const double allowed = static_cast<double>(demand.texels);
   const bool enough = sum <= allowed;
   while (!heap.empty() && (heap.front().Urgent() || (!enough && sum > kAim * allowed))) {
     std::pop_heap(heap.begin(), heap.end());
     Next next = heap.back();
     heap.pop_back();
-    granted[next.claim] = true;
-    next.error *= 0.5;
-    next.cost *= 2;
-    sum -= --next.doublings > 0 ? next.error : std::max(next.error, 2 * next.error - 1);
-    if (next.doublings == 0) continue;
+    const double before = next.error;
+    if (next.doublings > 0 || next.cost <= room) {
+      granted[next.claim] = true;
+      room -= next.cost;
+      next.error *= 0.5;
+      next.cost *= 2;
+      --(next.doublings > 0 ? next.doublings : next.further);
+    } else {
+      next.further = 0;
+    }
+    const bool goes_on = next.doublings + next.further > 0;
+    sum -= before - (goes_on ? next.error : std::min(next.error, 1.0));
+    if (!goes_on) continue;
     heap.push_back(next);
     std::push_heap(heap.begin(), heap.end());
   }
@@ -61,16 +91,16 @@ std::vector<bool> Allot(std::span<const Claim> claims, size_t texels, double& sp
   return granted;
 }
 
-bool IsMet(std::span<const Claim> claims, size_t texels) {
+bool IsMet(const Demand& demand) {
+  const double room = Room(demand);
   double sum = 0;
   bool any = false;
-  for (const Claim& claim : claims) {
-    const bool may_go_on = claim.doublings > 0 && claim.error > 0;
-    if (may_go_on && claim.error > kWorst * kWorst) return false;
-    any = any || may_go_on;
-    sum += static_cast<double>(claim.doublings > 0 ? claim.error : std::min(claim.error, 1.0f));
+  for (const Claim& claim : demand.claims) {
+    if (claim.doublings > 0 && claim.error > kWorst * kWorst) return false;
+    any = any || MayGoOn(claim, room);
+    sum += Counted(claim, room);
   }
-  return !any || sum <= static_cast<double>(texels);
+  return !any || sum <= static_cast<double>(demand.texels);
 }
 
 std::vector<float> TilePool::Mean(std::span<const float> values) const {

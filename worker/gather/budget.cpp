@@ -17,6 +17,10 @@ constexpr float kMargin = static_cast<float>(SetNoise::kMargin);  // what is rep
 constexpr float kChangedShare = 0.25f;                            // of a tile's texels; fewer leave the rest as it is
 constexpr size_t kTellingSets = 32;                               // fewer sets of a tile say little about all
 
+int Doublings(int samples, int most) {
+  return std::max(1, static_cast<int>(std::bit_width(static_cast<unsigned>(most / samples)))) - 1;
+}
+
 std::vector<float> Sum(std::vector<float> a, const std::vector<float>& b) {
   for (size_t i = 0; i < a.size(); ++i) a[i] += b[i];
   return a;
@@ -81,48 +85,62 @@ void TileBudget::Decide(std::vector<TexelWork>& all) {
     direct_.changed += work.direct_active ? 1 : 0;
     indirect_.changed += work.indirect_active ? 1 : 0;
   }
-  const auto valid_count = static_cast<size_t>(std::count(valid.begin(), valid.end(), true));
   const TilePool pool(map_, begin_, std::move(valid));
   direct.pooled = pool.Variance(direct.variance, direct.samples);
   indirect.pooled = pool.Variance(indirect.variance, indirect.samples);
   // A stray sample must not raise its own tolerance: neighbours or the smoothed light judge.
-  std::vector<Claim> claims = Claims(all, direct, indirect, pool.Mean(Sum(direct.value, indirect.value)));
-  if (options_.filter && options_.target_error > 0 && !IsMet(claims, valid_count)) {
+  Demand demand = DemandOf(all, direct, indirect, pool.Mean(Sum(direct.value, indirect.value)));
+  if (options_.filter && options_.target_error > 0 && !IsMet(demand)) {
     direct_.Apply(*tile_, pool, direct);
     indirect_.Apply(*tile_, pool, indirect);
-    claims = Claims(all, direct, indirect, Sum(direct.value, indirect.value));
+    demand = DemandOf(all, direct, indirect, Sum(direct.value, indirect.value));
   }
-  if (!spare_) spare_ = kSpare * static_cast<double>(valid_count);
-  Grant(claims, valid_count, all);
+  if (!spare_) spare_ = kSpare * static_cast<double>(demand.texels);
+  Grant(demand, all);
 }
 
-// By pooled variances and irradiance a texel; two for each, of direct and of indirect light.
-std::vector<Claim> TileBudget::Claims(const std::vector<TexelWork>& all, const Part& direct, const Part& indirect,
-                                      const std::vector<float>& light) const {
-  std::vector<Claim> claims;
-  claims.reserve(2 * all.size());
+// By pooled variances and irradiance a texel; two claims for each, of direct and of indirect light.
+Demand TileBudget::DemandOf(const std::vector<TexelWork>& all, const Part& direct, const Part& indirect,
+                            const std::vector<float>& light) const {
+  Demand demand;
+  double squares = 0, shares = 0;
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (!all[i].valid) continue;
+    ++demand.texels;
+    squares += static_cast<double>(Tolerated(light[i]) * Tolerated(light[i]));
+    shares += static_cast<double>(std::max(1.0f, light[i] / options_.mean_irradiance));
+  }
+  demand.ceiling = static_cast<double>(1 + kGatherCost) * static_cast<double>(options_.mean_samples) * shares;
+  // Together they may be off by what the tile tolerates: what dim texels leave of theirs is little to a bright one.
+  const auto fair = static_cast<float>(squares / static_cast<double>(demand.texels));
+  const int worst = std::min(options_.worst_samples, options_.max_samples);
+  demand.claims.reserve(2 * all.size());
   for (size_t i = 0; i < all.size(); ++i) {
     const TexelWork& work = all[i];
-    const float tolerated = Tolerated(light[i]);
+    const float square = Tolerated(light[i]) * Tolerated(light[i]);
     const auto claim = [&](bool has, int samples, float cost, float variance) {
-      const float error = variance > 0 ? std::min(variance / (kMargin * tolerated * tolerated), kBoundless) : 0;
-      const int doublings = has ? std::bit_width(static_cast<unsigned>(options_.max_samples / samples)) - 1 : 0;
-      claims.push_back({has ? error : 0, cost * static_cast<float>(samples), doublings});
+      const float error = has && variance > 0 ? std::min(variance / (kMargin * square), kBoundless) : 0;
+      const int doublings = has ? Doublings(samples, worst) : 0;
+      const int further = has ? Doublings(samples, options_.max_samples) - doublings : 0;
+      demand.claims.push_back(
+          {error, cost * static_cast<float>(samples), doublings, further, std::max(1.0f, square / fair)});
     };
     const float missed = work.Missed(light[i]);
     claim(work.has_direct, work.direct_samples, 1, std::max(direct.pooled[i], missed * missed));
     claim(work.has_indirect, work.indirect_samples, kGatherCost, indirect.pooled[i]);
   }
-  return claims;
+  return demand;
 }
 
 // Makes active who gets more samples: without a target everybody.
-void TileBudget::Grant(const std::vector<Claim>& claims, size_t valid, std::vector<TexelWork>& work) {
+void TileBudget::Grant(const Demand& demand, std::vector<TexelWork>& work) {
+  const std::vector<Claim>& claims = demand.claims;
   const std::vector<bool> granted =
-      options_.target_error > 0 ? Allot(claims, valid, *spare_) : std::vector<bool>(claims.size(), true);
+      options_.target_error > 0 ? Allot(demand, *spare_) : std::vector<bool>(claims.size(), true);
+  const auto goes_on = [&](size_t i) { return granted[i] && claims[i].doublings + claims[i].further > 0; };
   for (size_t i = 0; i < work.size(); ++i) {
-    work[i].direct_active = claims[2 * i].doublings > 0 && granted[2 * i];
-    work[i].indirect_active = claims[2 * i + 1].doublings > 0 && granted[2 * i + 1];
+    work[i].direct_active = goes_on(2 * i);
+    work[i].indirect_active = goes_on(2 * i + 1);
   }
 }
 

@@ -45,9 +45,9 @@ class TileBudget {
 
   float Weighing(float irradiance) const;
   void CorrectVariances(std::vector<TexelWork>& work) const;
-  std::vector<Claim> Claims(const std::vector<TexelWork>& work, const Part& direct, const Part& indirect,
-                            const std::vector<float>& light) const;
-  void Grant(const std::vector<Claim>& claims, size_t valid, std::vector<TexelWork>& work);
+  Demand DemandOf(const std::vector<TexelWork>& work, const Part& direct, const Part& indirect,
+                  const std::vector<float>& light) const;
+  void Grant(const Demand& demand, std::vector<TexelWork>& work);
 
   const TexelMap& map_;
   const uint32_t begin_;

@@ -15,7 +15,9 @@ namespace bakewell {
 struct GatherOptions {
   int min_samples = 16;  // powers of two, at least 4
   int max_samples = 1024;
-  float target_error = 0;  // standard error over sqrt(mean * max(irradiance, floor_share * mean)); 0: never stops
+  int worst_samples = 1024;  // at most max_samples: with more, a texel goes on for its tile's sum of errors alone
+  int mean_samples = 1024;   // and then its tile may have no more a texel, or a texel's share of light, on average
+  float target_error = 0;    // standard error over sqrt(mean * max(irradiance, floor_share * mean)); 0: never stops
   float floor_share = 0.25f;
   float mean_irradiance = 0;  // luminance, of the whole bake, as the photons saw it [W m^-2]
   uint32_t seed = 0;

@@ -10,20 +10,29 @@ namespace bakewell {
 namespace {
 
 struct QualityNumbers {
-  int min_samples, max_samples, photons_per_texel;
+  int min_samples, mean_samples, photons_per_texel;
   float target_error;
 };
 
 QualityNumbers NumbersOf(Quality quality) {
   switch (quality) {
     case Quality::kPreview:
-      return {4, 256, 6, 0.08f};
+      return {4, 256, 12, 0.08f};
     case Quality::kMedium:
-      return {4, 512, 24, 0.04f};
+      return {4, 512, 48, 0.04f};
     case Quality::kHigh:
       break;
   }
   return {16, 16384, 512, 0.0065f};  // sampling and photons together: 1 %
+}
+
+constexpr int kMostSamples = 16384;  // of a texel
+
+// Where one texel's error alone may still ask for more samples; at 8 % 256.
+int WorstSamples(float target_error) {
+  constexpr float kAtOne = 20.48f;
+  const float samples = std::min(kAtOne / target_error, static_cast<float>(kMostSamples));
+  return static_cast<int>(std::exp2(std::round(std::log2(samples))));
 }
 
 // Light below this share of the mean may have errors of its size: the less error is asked for, the dimmer what is to be
@@ -45,9 +54,11 @@ Budget BudgetOf(const BakeSettings& settings, int64_t texels) {
   budget.gather.min_samples = settings.min_samples > 0 ? settings.min_samples : numbers.min_samples;
   // An error of one's own choice may need more samples and photons than the quality's.
   const QualityNumbers limits = settings.target_error > 0 ? NumbersOf(Quality::kHigh) : numbers;
-  budget.gather.max_samples = settings.max_samples > 0 ? settings.max_samples : limits.max_samples;
+  budget.gather.max_samples = settings.max_samples > 0 ? settings.max_samples : kMostSamples;
+  budget.gather.mean_samples = std::min(limits.mean_samples, budget.gather.max_samples);
   budget.gather.min_samples = std::min(budget.gather.min_samples, budget.gather.max_samples);
   budget.gather.target_error = settings.target_error > 0 ? settings.target_error : numbers.target_error;
+  budget.gather.worst_samples = WorstSamples(budget.gather.target_error);
   budget.gather.floor_share = FloorShare(budget.gather.target_error);
   budget.gather.seed = settings.seed;
   budget.gather.filter = settings.filter;

@@ -12,7 +12,7 @@ namespace bakewell {
 namespace {
 
 constexpr int64_t kPilot = 32768, kNextPilot = 8, kMostPilot = 262144;  // photons
-constexpr int64_t kWorthAPilot = 4;                                     // times its photons may be needed
+constexpr int64_t kWorthAPilot = 2;                                     // times its photons may be needed
 constexpr int64_t kTrusted = 16;  // times its photons a pilot may ask for; else a larger one is asked
 constexpr double kFarBeyond = 2;  // times the most photons there are: no larger pilot would ask for fewer
 constexpr size_t kPilotPoints = 512;
@@ -104,7 +104,7 @@ double Needed(const Pilot& pilot, const GatherOptions& gather, int64_t texels) {
   const double share = kPhotonShare * target;
   const double for_noise = pilot.outlook.photon_variance / (share * share) * pilot.photons;
   const double samples = std::clamp(kSetShare * pilot.outlook.ray_variance / (target * target),
-                                    static_cast<double>(gather.min_samples), static_cast<double>(gather.max_samples));
+                                    static_cast<double>(gather.min_samples), static_cast<double>(gather.mean_samples));
   // Where photons p^b cost as much as a bounce saves: the derivative of photons + bounces by p is zero.
   const double bounces = static_cast<double>(texels) * samples * pilot.outlook.bounces;
   const double for_cost =
