@@ -79,6 +79,30 @@ TEST(PhotonsFor, HalfTheErrorNeedsFourTimesThePhotonsWhereTheirNoiseDecides) {
   EXPECT_NEAR(static_cast<double>(room.Needed(settings)) / coarse, 4, 0.01);
 }
 
+// A pilot that wants far more photons than there may be has said all: the number is the most, and time is not lost on a
+// larger one.
+TEST(PhotonsFor, NoLargerPilotFliesWhereTheFirstAsksForFarMoreThanThereAre) {
+  const Prepared room(SlitLevel(24, 0.02));
+  const auto pilots = [&](float target_error) {
+    BakeSettings settings;
+    settings.seed = kSeed;
+    settings.target_error = target_error;
+    return room.With([&](const PhotonScene& scene) {
+      int flown = 0;
+      const auto counted = [&](int walks) {
+        ++flown;
+        return scene.starts(walks);
+      };
+      constexpr int64_t kTexels = 4000;
+      PhotonsFor({scene.world, scene.lights, kTexels, counted}, settings, SilentProgress());
+      return flown;
+    });
+  };
+  EXPECT_EQ(pilots(0.05f), 1);   // enough for what it asks
+  EXPECT_EQ(pilots(0.003f), 2);  // more than a pilot of its size can tell
+  EXPECT_EQ(pilots(0.0005f), 1);
+}
+
 TEST(PhotonsFor, IsTheSameForAnyNumberOfThreads) {
   const Prepared room(RoomBehindASlit());
   std::vector<int64_t> needed;

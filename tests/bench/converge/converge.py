@@ -230,7 +230,7 @@ def bench_scene(name, quick):
     scene = Scene(name)
     large = scene.mask.size > LARGE_PAGE
     shorter = lambda rows: (rows[:-1] if quick else rows)[:1 if quick and large else None]
-    fixed = [measure(scene, *budget) for budget in budgets([16, 64] if quick and large else [16, 64, 256] if quick else [16, 32, 64, 128, 256, 512, 1024])]
+    fixed = [measure(scene, *budget) for budget in budgets([16, 64] if quick and large else [4, 16, 64, 256] if quick else [4, 8, 16, 32, 64, 128, 256, 512, 1024])]
     qualities = [measure(scene, f"bakewell {q}", "bake", ["--quality", q]) for q in (["preview"] if quick and large else ["preview", "medium", "high"])]
     if not (quick and large):
         qualities.insert(2, measure(scene, "bakewell, 2 % asked", "bake", ["--target-error", "0.02"]))
