@@ -21,6 +21,7 @@ enum class Signal : uint8_t { kIndirect, kDirect };
 constexpr int kBlock = 32;  // texels a side that are weighed at a time
 constexpr float kMargin = static_cast<float>(SetNoise::kMargin);
 constexpr float kOfOne = 0.4f;     // one difference varies more than a patch of them
+constexpr double kPageSays = 8;    // texels
 constexpr float kMuchNoisier = 2;  // of two variances at a seam: the noisier counts for less
 
 class PageFilter {
@@ -40,25 +41,25 @@ class PageFilter {
   // Returns what is to be added to FilterCounters::bias_square.
   double Run(Signal signal, std::vector<bool>& filtered) {
     signal_ = signal;
-    std::vector<LightPart> smooth(texels_.size());
-    std::vector<uint8_t> changed(texels_.size(), 0);
-    std::vector<double> bias_square(texels_.size(), 0);
+    std::vector<Smoothed> smooth(texels_.size());
     tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) {
       const Block& block = blocks_[b];
       thread_local Workspace work;
       if (!Weigh(block, work)) return;
       for (size_t k = block.begin; k < block.end; ++k) {
         const Texel& texel = map_.texels[texels_[k]];
-        changed[k] = Smooth(texel.x - block.left, texel.y - block.top, work, smooth[k], bias_square[k]) ? 1 : 0;
+        smooth[k] = Smooth(texel.x - block.left, texel.y - block.top, work);
       }
     });
-    Settle(changed, bias_square, smooth);
+    Settle(smooth);
+    double bias_square = 0;
     for (size_t k = 0; k < texels_.size(); ++k) {
-      if (changed[k] == 0) continue;
-      Replace(lights_[texels_[k]], smooth[k]);
+      bias_square += smooth[k].bias_square;
+      if (!smooth[k].changed) continue;
+      Replace(lights_[texels_[k]], smooth[k].light);
       filtered[texels_[k]] = true;
     }
-    return std::accumulate(bias_square.begin(), bias_square.end(), 0.0);
+    return bias_square;
   }
 
   // Along the seams, after Run of the same signal. Returns what is to be added to FilterCounters::bias_square.
@@ -92,11 +93,17 @@ class PageFilter {
     };
     std::vector<Cut> cuts;  // Connections::CutOff, where there is any
   };
-  // The part that is filtered: irradiance and SH side by side, filled up to four registers.
-  static constexpr size_t kWide = 32;
+  // The part that is filtered: irradiance, SH and what photons do to it side by side, four registers.
+  static constexpr size_t kWide = 32, kLight = 30;
   struct alignas(32) PartLight {
-    std::array<float, kWide> numbers;
+    std::array<float, kWide> numbers{};
     Rgb variance;
+  };
+  struct Smoothed {
+    LightPart light;
+    bool changed = false;
+    double bias_square = 0;
+    float photons_before = 0, photons_after = 0;  // sums of the squares of TexelLight::photon_noise
   };
   // A block's texels and those around it.
   struct Workspace {
@@ -188,17 +195,18 @@ class PageFilter {
     PartLight part;
     part.variance = VarianceOf(light);
     const float *whole = &light.irradiance.x, *indirect = &light.indirect.irradiance.x;
-    for (size_t k = 0; k < kWide; ++k) {
+    for (size_t k = 0; k < kLight; ++k) {
       part.numbers[k] = signal_ == Signal::kIndirect ? indirect[k] : whole[k] - indirect[k];
     }
+    if (signal_ == Signal::kIndirect) std::copy_n(light.photon_noise.begin(), kWide - kLight, &part.numbers[kLight]);
     return part;
   }
 
   // (x, y) is in the block.
-  bool Smooth(int x, int y, Workspace& work, LightPart& result, double& bias_square) const {
+  Smoothed Smooth(int x, int y, Workspace& work) const {
     const float own_weight = work.weights.Weight(x, y, 0, 0);
-    if (own_weight == 1) return false;
-    std::array<float, sizeof(LightPart) / sizeof(float)> sum{};  // of which the variance is put right at the end
+    if (own_weight == 1) return {};
+    std::array<float, kWide> sum{};
     Rgb variance;
     for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
       for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
@@ -209,41 +217,74 @@ class PageFilter {
         variance += light.variance * (weight * weight);
       }
     }
-    result = std::bit_cast<LightPart>(sum);
     const SimilarTexels::Mean& mean = work.weights.MeanOf(x, y);
     const float chosen = mean.follows * mean.follows - own_weight * own_weight;  // the weights' part
-    result.variance = variance + work.At(x, y).variance * chosen;
-    bias_square = static_cast<double>(mean.bias_square);
-    return std::min({result.irradiance.x, result.irradiance.y, result.irradiance.z}) >= 0;
+    const PartLight& own = work.At(x, y);
+    Smoothed result{LightOf(sum, variance + own.variance * chosen)};
+    result.bias_square = static_cast<double>(mean.bias_square);
+    for (size_t k = kLight; k < kWide; ++k) {
+      const float square = own.numbers[k] * own.numbers[k];
+      result.photons_before += square;
+      result.photons_after += sum[k] * sum[k] + square * chosen;
+    }
+    const Rgb irradiance = result.light.irradiance;
+    result.changed = std::min({irradiance.x, irradiance.y, irradiance.z}) >= 0;
+    return result;
   }
 
-  // By charts: weights that avoid a bright stray lose its light, so the sum is brought back to what it was; and what
-  // they blur is counted as variance: one texel's bias is a guess, a chart's is not.
-  void Settle(const std::vector<uint8_t>& changed, const std::vector<double>& bias_square,
-              std::vector<LightPart>& smooth) const {
+  static LightPart LightOf(const std::array<float, kWide>& numbers, Rgb variance) {
+    std::array<float, sizeof(LightPart) / sizeof(float)> light{};
+    std::copy_n(numbers.begin(), kLight, light.begin());
+    LightPart part = std::bit_cast<LightPart>(light);
+    part.variance = variance;
+    return part;
+  }
+
+  // By charts: weights that avoid a bright stray lose its light, so the sum is brought back to what it was; what they
+  // blur is counted as variance: one texel's bias is a guess, a chart's is not; and of the photons' noise as much is
+  // left as of the numbers that stand for it.
+  void Settle(std::vector<Smoothed>& smooth) {
     struct Sum {
-      double before = 0, after = 0, variance = 0, bias_square = 0;
+      double before = 0, after = 0, variance = 0, bias_square = 0, photons_before = 0, photons_after = 0, texels = 0;
+      void Add(double value, const Smoothed& one) {
+        before += value;
+        after += static_cast<double>(Luminance(one.light.irradiance));
+        variance += static_cast<double>(Luminance(one.light.variance));
+        bias_square += one.bias_square;
+        photons_before += static_cast<double>(one.photons_before);
+        photons_after += static_cast<double>(one.photons_after);
+        texels += 1;
+      }
     };
     std::map<int32_t, Sum> charts;
+    Sum all;
     for (size_t k = 0; k < texels_.size(); ++k) {
-      if (changed[k] == 0) continue;
-      Sum& sum = charts[map_.texels[texels_[k]].chart];
-      sum.before += static_cast<double>(ValueOf(lights_[texels_[k]]));
-      sum.after += static_cast<double>(Luminance(smooth[k].irradiance));
-      sum.variance += static_cast<double>(Luminance(smooth[k].variance));
-      sum.bias_square += bias_square[k];
+      if (!smooth[k].changed) continue;
+      const auto value = static_cast<double>(ValueOf(lights_[texels_[k]]));
+      charts[map_.texels[texels_[k]].chart].Add(value, smooth[k]);
+      all.Add(value, smooth[k]);
     }
     for (size_t k = 0; k < texels_.size(); ++k) {
-      if (changed[k] == 0) continue;
+      if (!smooth[k].changed) continue;
       const Sum& sum = charts[map_.texels[texels_[k]].chart];
+      LightPart& light = smooth[k].light;
       if (sum.variance > 0 && sum.bias_square > 0) {
-        smooth[k].variance = smooth[k].variance * static_cast<float>(1 + sum.bias_square / sum.variance);
+        light.variance = light.variance * static_cast<float>(1 + sum.bias_square / sum.variance);
+      }
+      if (sum.photons_before > 0) {
+        // Few texels say little, so that the page has a say.
+        const double some = kPageSays * sum.photons_before / sum.texels;
+        const double left =
+            (sum.photons_after + some * all.photons_after / all.photons_before) / (sum.photons_before + some);
+        TexelLight& whole = lights_[texels_[k]];
+        const Rgb sampled = whole.direct_variance + whole.indirect.variance;
+        whole.variance = sampled + (whole.variance - sampled) * static_cast<float>(std::min(1.0, left));
       }
       if (!(sum.after > 0)) continue;
       const float scale = static_cast<float>(sum.before / sum.after);
-      smooth[k].irradiance = smooth[k].irradiance * scale;
-      for (Rgb& lambda : smooth[k].sh.lambda) lambda = lambda * scale;
-      smooth[k].variance = smooth[k].variance * (scale * scale);
+      light.irradiance = light.irradiance * scale;
+      for (Rgb& lambda : light.sh.lambda) lambda = lambda * scale;
+      light.variance = light.variance * (scale * scale);
     }
   }
 
@@ -252,9 +293,8 @@ class PageFilter {
   bool Join(std::span<const Seam> seams, LightPart& result, double& bias_square) const {
     const TexelLight& light = lights_[seams.front().texel];
     const float own_value = ValueOf(light), own_variance = Luminance(VarianceOf(light));
-    std::array<float, sizeof(LightPart) / sizeof(float)> sum{};  // as in Smooth
     const PartLight own = PartOf(light);
-    std::copy(own.numbers.begin(), own.numbers.end(), sum.begin());
+    std::array<float, kWide> sum = own.numbers;
     Rgb variance = own.variance;
     float total = 1, moved = 0;
     for (const Seam& seam : seams) {
@@ -272,8 +312,7 @@ class PageFilter {
     }
     if (total == 1) return false;
     for (float& number : sum) number /= total;
-    result = std::bit_cast<LightPart>(sum);
-    result.variance = variance / (total * total);
+    result = LightOf(sum, variance / (total * total));
     moved /= total;
     const float noise = own_variance * (1 - 2 / total) + Luminance(result.variance);
     bias_square = static_cast<double>(moved * moved - noise / kMargin);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -40,7 +41,10 @@ struct TexelLight {
   Rgb variance;         // of irradiance, sampling and photons together
   LightPart indirect;   // of the three above, what the final gather found
   Rgb direct_variance;  // of the variance, what light sampling left
-  uint8_t open = 0;     // ConnectTexel: which neighbours the filter may look at
+  // What the finite number of photons does to the irradiance's luminance: two numbers whose squares are its variance on
+  // average, and which neighbours have in common as far as they have the photons in common.
+  std::array<float, 2> photon_noise{};
+  uint8_t open = 0;  // ConnectTexel: which neighbours the filter may look at
   float backface_share = 0;
   bool valid = true;  // false: inside other geometry; light is zero and no evidence for anybody
   int direct_samples = 0, indirect_samples = 0;

@@ -58,6 +58,19 @@ struct TexelWork {
     return sum / (n * n * kVarianceGroups * (kVarianceGroups - 1));
   }
 
+  // Two of the seven directions in which eight groups can differ; their squares are PhotonVariance on average.
+  std::array<float, 2> PhotonNoise() const {
+    static_assert(kVarianceGroups == 8);
+    if (indirect.count() <= 0) return {};
+    float alternate = 0, pairs = 0;
+    for (size_t g = 0; g < kVarianceGroups; ++g) {
+      alternate += g % 2 == 0 ? group[g] : -group[g];
+      pairs += g % 4 < 2 ? group[g] : -group[g];
+    }
+    const float scale = 1 / (kVarianceGroups * indirect.count());
+    return {alternate * scale, pairs * scale};
+  }
+
   TexelLight Finish() const {
     TexelLight light;
     light.valid = valid;
@@ -74,6 +87,7 @@ struct TexelWork {
     if (luminance > 0) {
       const Rgb share = light.irradiance / luminance;
       light.variance += share * share * PhotonVariance();
+      light.photon_noise = PhotonNoise();
     }
     light.open = open;
     light.direct_samples = direct_samples;

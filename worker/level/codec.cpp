@@ -121,6 +121,7 @@ void PutTexel(const TexelLight& light, NumberWriter& writer) {
   writer.Put(light.variance);
   writer.Put(light.indirect);
   writer.Put(light.direct_variance);
+  for (const float noise : light.photon_noise) writer.Put(noise);
   writer.Put(light.backface_share);
   writer.Put(static_cast<uint8_t>(light.valid));
   writer.Put(light.open);
@@ -134,6 +135,7 @@ void GetTexel(NumberReader& reader, TexelLight& light) {
   light.variance = reader.Get<Rgb>();
   light.indirect = reader.Get<LightPart>();
   light.direct_variance = reader.Get<Rgb>();
+  for (float& noise : light.photon_noise) noise = reader.Get<float>();
   light.backface_share = reader.Get<float>();
   light.valid = reader.Get<uint8_t>() != 0;
   light.open = reader.Get<uint8_t>();
@@ -141,7 +143,7 @@ void GetTexel(NumberReader& reader, TexelLight& light) {
   light.indirect_samples = static_cast<int>(reader.Get<uint32_t>());
 }
 
-constexpr size_t kTexelBytes = 4 * (2 * (3 + 27 + 3) + 3 + 1) + 2 + 8;
+constexpr size_t kTexelBytes = 4 * (2 * (3 + 27 + 3) + 3 + 2 + 1) + 2 + 8;
 constexpr size_t kCellBytes = sizeof(Rgb) + sizeof(CachedLight::group_share) + 1;
 constexpr size_t kFluxBytes = 8 + 4 + sizeof(CellFlux::flux) + sizeof(CellFlux::group);
 constexpr size_t kHeadBytes = 1024;  // what precedes the texels, cells or photons, about
