@@ -282,5 +282,82 @@ def partitions(rng):
     return level
 
 
+def shade(rng):
+    """Bulbs in shades that are open at the top and have a slit below: most light falls on a hundredth of the texels."""
+    level = Level(rng, (0.3, 0.8))
+    level.room([8, 3, 7])
+    level.material("bulb", [0, 0, 0], [300, 260, 200])
+    for _ in range(5):
+        x, y, z = rng.uniform([-3, 1.2, -2.6], [3, 2.2, 2.6])
+        level.sphere("bulb", [x, y, z], 0.04, 1)
+        for side in (-0.15, 0.15):
+            level.box("m3", [x + side, y, z], [0.01, 0.3, 0.3])
+            level.box("m3", [x, y, z + side], [0.3, 0.3, 0.01])
+        level.box("m3", [x, y - 0.15, z + 0.03], [0.3, 0.01, 0.24])
+    for _ in range(8):
+        level.box(level.some(), [rng.uniform(-3, 3), 0.45, rng.uniform(-2.6, 2.6)], rng.uniform(0.3, 0.9, 3))
+    return level
+
+
+def cove(rng):
+    """Strips behind lips light the ceiling, which lights the room."""
+    level = Level(rng, (0.4, 0.85))
+    level.room([7, 2.8, 5])
+    level.material("strip", [0, 0, 0], [60, 52, 40])
+    for side in (-1, 1):
+        level.box("m1", [0, 2.45, side * 2.25], [7, 0.03, 0.5])
+        level.box("m1", [0, 2.5, side * 2.0], [7, 0.12, 0.03])
+        level.quad("strip", [-3.3, 2.48, side * 2.2 - 0.01], [0, 0, 0.02], [6.6, 0, 0])
+    for _ in range(10):
+        level.box(level.some(), [rng.uniform(-3, 3), 0.45, rng.uniform(-2, 2)], rng.uniform(0.3, 0.9, 3))
+    return level
+
+
+def gaps(rng):
+    """Cupboards a finger or a hand from the walls, tables with thin tops, a carpet, pictures on the walls."""
+    level = Level(rng, (0.3, 0.8))
+    level.room([7, 2.7, 5])
+    for _ in range(8):
+        gap, x, width, height = rng.choice([0.01, 0.03, 0.08]), rng.uniform(-3, 3), rng.uniform(0.5, 1.0), rng.uniform(0.8, 2.2)
+        level.box(level.some(), [x, height / 2 + 0.05, rng.choice([-1, 1]) * (2.25 - gap)], [width, height, 0.5])
+    for _ in range(4):
+        x, z = rng.uniform([-2.5, -1.2], [2.5, 1.2])
+        level.box("m1", [x, 0.75, z], [1.2, 0.03, 0.7])
+        for dx in (-0.55, 0.55):
+            for dz in (-0.3, 0.3):
+                level.box("m1", [x + dx, 0.37, z + dz], [0.05, 0.73, 0.05])
+    level.box("m4", [0, 0.005, 0], [3, 0.01, 2])
+    for k in range(5):
+        level.box(level.some(), [1.3 * k - 3, 1.6, 2.49], [0.6, 0.4, 0.02])
+    level.material("lamp", [0, 0, 0], [40, 36, 30])
+    level.sphere("lamp", [0.5, 2.3, 0.2], 0.12)
+    level.light("spot", [-2.5, 2.6, -1], [0.2, -1, 0.1], color=[1.0, 0.9, 0.8], intensity=60.0, spot={"innerConeAngle": 0.2, "outerConeAngle": 0.6})
+    return level
+
+
+def terrain(rng):
+    """Hills, rough trees and a hut with a door under sun and sky."""
+    level = Level(rng, (0.1, 0.5), BLUE_SKY)
+    height = lambda x, z: 2 * math.sin(0.13 * x + 1) * math.cos(0.11 * z) + 0.7 * math.sin(0.5 * x) * math.sin(0.43 * z)
+    place = lambda x, z: np.array([x, height(x, z), z])
+    rise = lambda x, z: unit(np.cross(place(x, z + 0.05) - place(x, z - 0.05), place(x + 0.05, z) - place(x - 0.05, z)))
+    for x in np.arange(-30, 30, 1.5):
+        for z in np.arange(-30, 30, 1.5):
+            a, b, c, d = (x, z), (x, z + 1.5), (x + 1.5, z + 1.5), (x + 1.5, z)
+            for corners in ((a, b, c), (a, c, d)):
+                level.triangle("m0", np.array([place(*p) for p in corners]), [rise(*p) for p in corners])
+    for _ in range(25):
+        (x, z), radius = rng.uniform(-27, 27, 2), rng.uniform(0.8, 2)
+        level.box("m4", [x, height(x, z) + 1.2, z], [0.3, 3, 0.3])
+        level.sphere("m5", [x, height(x, z) + 2.6 + 0.8 * radius, z], radius, 2, 0.12)
+    floor = height(5, 5) + 0.3
+    for dx, dz, size in ((2, 0, (0.2, 3, 4)), (-2, 0, (0.2, 3, 4)), (0, -2, (4, 3, 0.2)), (-0.8, 2, (2.4, 3, 0.2))):
+        level.box("m2", [5 + dx, floor + 1.2, 5 + dz], size)
+    level.box("m3", [5, floor + 2.8, 5], [4.6, 0.2, 4.6])
+    level.light("directional", None, [0.5, -0.7, 0.3], intensity=5.0, **SUN)
+    return level
+
+
 # Texels per metre, so that each has 10,000 to 30,000.
-KINDS = {clutter: 6, bright: 10, doorway: 9, cave: 6, night: 2.5, shelves: 8, rooms: 7, canopy: 7, spots: 5, tubes: 6, partitions: 8}
+KINDS = {clutter: 6, bright: 10, doorway: 9, cave: 6, night: 2.5, shelves: 8, rooms: 7, canopy: 7, spots: 5, tubes: 6, partitions: 8, shade: 7, cove: 8, gaps: 9,
+         terrain: 1.2}
