@@ -21,7 +21,7 @@ enum class Signal : uint8_t { kIndirect, kDirect };
 constexpr int kBlock = 32;  // texels a side that are weighed at a time
 constexpr float kMargin = static_cast<float>(SetNoise::kMargin);
 constexpr float kOfOne = 0.4f;     // one difference varies more than a patch of them
-constexpr double kPageSays = 8;    // texels
+constexpr double kPageSays = 8;    // texels: for as many of a chart's counts what is left of photons' noise on its page
 constexpr float kMuchNoisier = 2;  // of two variances at a seam: the noisier counts for less
 
 class PageFilter {
@@ -278,7 +278,7 @@ class PageFilter {
             (sum.photons_after + some * all.photons_after / all.photons_before) / (sum.photons_before + some);
         TexelLight& whole = lights_[texels_[k]];
         const Rgb sampled = whole.direct_variance + whole.indirect.variance;
-        whole.variance = sampled + (whole.variance - sampled) * static_cast<float>(std::min(1.0, left));
+        whole.variance = sampled + (whole.variance - sampled) * static_cast<float>(std::max(0.0, std::min(1.0, left)));
       }
       if (!(sum.after > 0)) continue;
       const float scale = static_cast<float>(sum.before / sum.after);
