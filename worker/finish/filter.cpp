@@ -20,9 +20,10 @@ enum class Signal : uint8_t { kIndirect, kDirect };
 
 constexpr int kBlock = 32;  // texels a side that are weighed at a time
 constexpr float kMargin = static_cast<float>(SetNoise::kMargin);
-constexpr float kOfOne = 0.4f;     // one difference varies more than a patch of them
-constexpr double kPageSays = 8;    // texels: for as many of a chart's counts what is left of photons' noise on its page
-constexpr float kMuchNoisier = 2;  // of two variances at a seam: the noisier counts for less
+constexpr float kOfOne = 0.4f;       // one difference varies more than a patch of them
+constexpr double kPageSays = 8;      // texels: as many of a chart's is the page's mean worth
+constexpr double kPhotonMargin = 2;  // of what is left of photons' noise, so that what is reported is safe
+constexpr float kMuchNoisier = 2;    // of two variances at a seam: the noisier counts for less
 
 class PageFilter {
  public:
@@ -274,8 +275,8 @@ class PageFilter {
       if (sum.photons_before > 0) {
         // Few texels say little, so that the page has a say.
         const double some = kPageSays * sum.photons_before / sum.texels;
-        const double left =
-            (sum.photons_after + some * all.photons_after / all.photons_before) / (sum.photons_before + some);
+        const double left = kPhotonMargin * (sum.photons_after + some * all.photons_after / all.photons_before) /
+                            (sum.photons_before + some);
         TexelLight& whole = lights_[texels_[k]];
         const Rgb sampled = whole.direct_variance + whole.indirect.variance;
         whole.variance = sampled + (whole.variance - sampled) * static_cast<float>(std::max(0.0, std::min(1.0, left)));

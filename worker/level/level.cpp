@@ -9,6 +9,8 @@ namespace bakewell {
 
 namespace {
 
+constexpr int kMostSamples = 16384;  // of a texel
+
 struct QualityNumbers {
   int min_samples, mean_samples, photons_per_texel;
   float target_error;
@@ -23,10 +25,8 @@ QualityNumbers NumbersOf(Quality quality) {
     case Quality::kHigh:
       break;
   }
-  return {16, 16384, 512, 0.0065f};  // sampling and photons together: 1 %
+  return {16, kMostSamples, 512, 0.0065f};  // sampling and photons together: 1 %
 }
-
-constexpr int kMostSamples = 16384;  // of a texel
 
 // Where one texel's error alone may still ask for more samples; at 8 % 256.
 int WorstSamples(float target_error) {
