@@ -23,39 +23,41 @@ int32_t SmoothTile::TexelAt(int x, int y) const {
 
 std::vector<uint8_t> SmoothTile::Connect(const World& world, const std::vector<bool>& valid,
                                          const std::vector<bool>& crowded, int64_t& rays) {
-  std::vector<uint8_t> open(end_ - begin_, 0);
+  valid_ = valid;
+  open_.assign(valid.size(), 0);
+  for (uint32_t i = 0; i < end_ - begin_; ++i) {
+    if (valid[i]) open_[i] = ConnectTexel(world, map_, begin_ + i, crowded[i], rays);
+  }
+  return open_;
+}
+
+// The tile, and as far around it as windows reach.
+Connections SmoothTile::Grid() const {
   Connections grid(kTileSide + 2 * kWindowRadius, kTileSide + 2 * kWindowRadius);
   for (int y = 0; y < grid.height(); ++y) {
     for (int x = 0; x < grid.width(); ++x) {
       const int32_t at = TexelAt(left_ - kWindowRadius + x, top_ - kWindowRadius + y);
-      if (at < 0) continue;
-      const uint32_t texel = static_cast<uint32_t>(at);
-      if (!IsMine(texel)) {
-        ConnectCell(x, y, texel, valid, 0xf, grid);
-      } else if (valid[texel - begin_]) {
-        open[texel - begin_] = ConnectTexel(world, map_, texel, crowded[texel - begin_], rays);
-        ConnectCell(x, y, texel, valid, open[texel - begin_], grid);
-      }
+      if (at >= 0) ConnectCell(x, y, static_cast<uint32_t>(at), grid);
     }
   }
   grid.Finish();
-  Locate(valid, grid);
-  return open;
+  return grid;
 }
 
-void SmoothTile::ConnectCell(int x, int y, uint32_t texel, const std::vector<bool>& valid, uint8_t open,
-                             Connections& grid) const {
+// Texels of other tiles count as connected.
+void SmoothTile::ConnectCell(int x, int y, uint32_t texel, Connections& grid) const {
   const Texel& from = map_.texels[texel];
+  const uint8_t open = IsMine(texel) ? open_[texel - begin_] : 0xf;
   for (int k = 0; k < 4; ++k) {
+    if (!(open >> k & 1)) continue;
     const int32_t at = TexelAt(from.x + kNeighbours[k][0], from.y + kNeighbours[k][1]);
     if (at < 0 || map_.texels[at].chart != from.chart) continue;
     const uint32_t other = static_cast<uint32_t>(at);
-    if (IsMine(other) && !valid[other - begin_]) continue;
-    if (open >> k & 1) grid.Connect(x, y, k);
+    if (!IsMine(other) || valid_[other - begin_]) grid.Connect(x, y, k);
   }
 }
 
-void SmoothTile::Locate(const std::vector<bool>& valid, const Connections& grid) {
+void SmoothTile::Locate(const Connections& grid) {
   constexpr size_t kRow = kTileSide + 2 * kWindowRadius;
   std::array<int32_t, kRow * kRow> part, known{};
   const auto at = [](int x, int y) {
@@ -68,7 +70,7 @@ void SmoothTile::Locate(const std::vector<bool>& valid, const Connections& grid)
   }
   places_.resize(end_ - begin_);
   for (size_t i = 0; i < places_.size(); ++i) {
-    if (!valid[i]) continue;
+    if (!valid_[i]) continue;
     Place& place = places_[i];
     place.x = map_.texels[begin_ + i].x - left_;
     place.y = map_.texels[begin_ + i].y - top_;
@@ -107,7 +109,8 @@ void SmoothTile::Locate(const std::vector<bool>& valid, const Connections& grid)
 }
 
 std::vector<SimilarTexels::Mean> SmoothTile::Smooth(const std::vector<float>& value, const std::vector<float>& variance,
-                                                    float margin) const {
+                                                    float margin) {
+  if (places_.empty()) Locate(Grid());
   thread_local SimilarTexels texels(kTileSide, kTileSide);
   texels.Clear();
   for (size_t i = 0; i < places_.size(); ++i) {

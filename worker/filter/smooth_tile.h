@@ -24,7 +24,7 @@ class SmoothTile {
   // filtering, one element a texel. The variance is that of the page, where texels around the tile will be as well
   // known as its own. margin: as in SimilarTexels::Regress.
   std::vector<SimilarTexels::Mean> Smooth(const std::vector<float>& value, const std::vector<float>& variance,
-                                          float margin) const;
+                                          float margin);
 
  private:
   struct Place {
@@ -35,13 +35,17 @@ class SmoothTile {
   };
   int32_t TexelAt(int x, int y) const;
   bool IsMine(uint32_t texel) const { return texel >= begin_ && texel < end_; }
-  void ConnectCell(int x, int y, uint32_t texel, const std::vector<bool>& valid, uint8_t open, Connections& grid) const;
-  void Locate(const std::vector<bool>& valid, const Connections& grid);
+  Connections Grid() const;
+  void ConnectCell(int x, int y, uint32_t texel, Connections& grid) const;
+  void Locate(const Connections& grid);
 
   const TexelMap& map_;
   const uint32_t begin_, end_;
-  int left_, top_;             // of the tile, on the page
-  std::vector<Place> places_;  // one element a texel of the tile
+  int left_, top_;  // of the tile, on the page
+  // One element a texel of the tile.
+  std::vector<bool> valid_;
+  std::vector<uint8_t> open_;
+  std::vector<Place> places_;  // once it is smoothed
 };
 
 }  // namespace bakewell

@@ -8,9 +8,10 @@ namespace {
 
 constexpr double kAim = 0.95;  // of the sum that is allowed: rounds for the last crumbs cost more than they bring
 
-constexpr double kWorthSparing = 0.5;  // errors below gain too little
+constexpr double kWorthSparing = 0.05;  // errors below gain too little
 
-constexpr float kChartsShare = 0.1f;  // of what a texel's variance is taken to be, the rest its neighbourhood's
+constexpr float kChartsSamples = 4;  // that its chart's mean counts as, beside a neighbourhood's own
+constexpr float kNeighbourhoodTexels = 9;
 
 // A claim's cost is what its samples so far have cost.
 double Room(const Demand& demand) {
@@ -82,11 +83,14 @@ std::vector<bool> Allot(const Demand& demand, double& spare) {
     heap.push_back(next);
     std::push_heap(heap.begin(), heap.end());
   }
-  while (enough && !heap.empty() && heap.front().cost <= spare && heap.front().error > kWorthSparing) {
+  while (enough && !heap.empty() && heap.front().error > kWorthSparing) {
     std::pop_heap(heap.begin(), heap.end());
-    spare -= heap.back().cost;
-    granted[heap.back().claim] = true;
+    const Next next = heap.back();
     heap.pop_back();
+    if (!claims[next.claim].spared_for) continue;
+    if (next.cost > spare) break;
+    spare -= next.cost;
+    granted[next.claim] = true;
   }
   return granted;
 }
@@ -143,7 +147,8 @@ std::vector<float> TilePool::Variance(std::vector<float> variance, std::span<con
     // Where all around there is nothing, there is nothing rare.
     if (!(variance[i] > 0)) continue;
     const Sum& chart = charts[map_.texels[begin_ + i].chart];
-    variance[i] = ((1 - kChartsShare) * variance[i] + kChartsShare * chart.variance / chart.texels) / count(i);
+    const float share = kChartsSamples / (kChartsSamples + kNeighbourhoodTexels * count(i));
+    variance[i] = ((1 - share) * variance[i] + share * chart.variance / chart.texels) / count(i);
   }
   return variance;
 }

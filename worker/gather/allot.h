@@ -10,11 +10,12 @@ namespace bakewell {
 
 // An estimator of one texel (light sampling or final gather) that asks for more samples.
 struct Claim {
-  float error = 0;    // its variance over the square of what the texel tolerates
-  float cost = 0;     // of doubling its samples, in any unit
-  int doublings = 0;  // of its samples that are possible
-  int further = 0;    // after those, for the sum alone and below the ceiling
-  float weight = 1;   // of the error in the sum
+  float error = 0;          // its variance over the square of what the texel tolerates
+  float cost = 0;           // of doubling its samples, in any unit
+  int doublings = 0;        // of its samples that are possible
+  int further = 0;          // after those, for the sum alone and below the ceiling
+  float weight = 1;         // of the error in the sum
+  bool spared_for = false;  // may have of what is to spare
 };
 
 // What the estimators of a tile ask for.
@@ -30,8 +31,8 @@ struct Demand {
 // (Neyman's allocation, with the marginal rule of Lagrange). Where a lit plain has less noise than it may, the penumbra
 // in its middle may have more. Granted is who will need to double at all until the sum is met, a few rounds ahead: what
 // a penumbra still owes after this round is no reason for the plain to double in it.
-// spare: what may be spent once the sum is met, in the unit of the costs, on those that gain most; what is granted of
-// it is taken off.
+// spare: what may be spent once the sum is met, in the unit of the costs, on those that gain most of those that it is
+// for; what is granted of it is taken off.
 inline constexpr float kWorst = 2;  // standard errors over what is tolerated
 std::vector<bool> Allot(const Demand& demand, double& spare);
 // Whether Allot grants nothing.

@@ -40,7 +40,7 @@ class TileBudget {
     std::vector<SimilarTexels::Mean> smoothed;
     std::vector<float> bias_square;  // of each, by it and its neighbours
     float changed = 0;               // texels that went on since
-    void Apply(const SmoothTile& tile, const TilePool& pool, Part& part);
+    void Apply(SmoothTile& tile, const TilePool& pool, Part& part);
   };
 
   float Weighing(float irradiance) const;

@@ -30,9 +30,13 @@ TEST(Allot, GrantsNothingWhereAllTogetherIsEnough) {
 
 // Symptom: half of a sunlit level's squared error lay on a hundredth of its texels, shadows' edges.
 TEST(Allot, WhatCanBeSparedGoesToThoseThatGainMost) {
-  std::vector<Claim> claims(100, {0.2f, 8, 6});
+  std::vector<Claim> claims(100, {.error = 0.2f, .cost = 8, .doublings = 6, .spared_for = true});
   claims[7].error = claims[8].error = claims[9].error = 3;
   claims[8].cost = 4;
+  claims[5].error = 50;  // of what nothing is spared for
+  claims[5].spared_for = false;
+  claims[5].doublings = 0;
+  claims[5].further = 1;
   double spare = 13;
   const std::vector<bool> granted = Allot({claims, 100}, spare);
   EXPECT_TRUE(granted[8] && (granted[7] || granted[9]));
@@ -42,7 +46,8 @@ TEST(Allot, WhatCanBeSparedGoesToThoseThatGainMost) {
 
 TEST(Allot, NothingIsSpentWhereAllGainLittle) {
   double spare = 1000;
-  EXPECT_EQ(Allot({std::vector<Claim>(100, {0.2f, 8, 6}), 100}, spare), std::vector<bool>(100, false));
+  const Claim little{.error = 0.04f, .cost = 8, .doublings = 6, .spared_for = true};
+  EXPECT_EQ(Allot({std::vector<Claim>(100, little), 100}, spare), std::vector<bool>(100, false));
   EXPECT_EQ(spare, 1000);
 }
 
