@@ -1,9 +1,14 @@
 #include "worker/filter/connections.h"
 
 #include <algorithm>
-#include <cstdlib>
+#include <bit>
 
 namespace bakewell {
+namespace {
+
+constexpr uint32_t kWholeRow = (1U << kWindowSide) - 1;  // of a window
+
+}  // namespace
 
 void Connections::Connect(int x, int y, int k) {
   const int nx = x + kNeighbours[k][0], ny = y + kNeighbours[k][1];
@@ -15,7 +20,7 @@ void Connections::Connect(int x, int y, int k) {
 void Connections::Finish() {
   MeasureRoom();
   NumberParts();
-  FindConvex();
+  PackOpen();
 }
 
 // Chebyshev distance to the nearest texel that lacks a connection, by two sweeps.
@@ -48,7 +53,6 @@ void Connections::NumberParts() {
   for (size_t first = 0; first < cells_.size(); ++first) {
     if (cells_[first].part != 0 || cells_[first].open == 0) continue;
     part = static_cast<uint16_t>(part % kMostParts + 1);
-    if (part >= convex_.size()) convex_.resize(part + size_t{1}, true);
     cells_[first].part = part;
     waiting.push_back(first);
     while (!waiting.empty()) {
@@ -65,101 +69,77 @@ void Connections::NumberParts() {
   }
 }
 
-// Convex in rows and columns (such polyominoes have monotone paths: Castiglione & Restivo 2003), and connected wherever
-// its texels touch.
-void Connections::FindConvex() {
-  constexpr int kNone = -2;
-  std::vector<int> line(convex_.size(), kNone), last(convex_.size(), kNone);
-  const auto visit = [&](uint16_t part, int number, int at) {
-    if (part == 0) return;
-    if (line[part] == number && last[part] != at - 1) convex_[part] = false;
-    line[part] = number;
-    last[part] = at;
-  };
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      const Cell& cell = At(x, y);
-      visit(cell.part, y, x);
-      if (cell.part == 0 || cell.open == 0xff) continue;
-      for (size_t k = 0; k < 4; ++k) {
-        const int nx = x + kNeighbours[k][0], ny = y + kNeighbours[k][1];
-        if (!(cell.open >> k & 1) && Contains(nx, ny) && At(nx, ny).part == cell.part) convex_[cell.part] = false;
+void Connections::PackOpen() {
+  constexpr size_t kBits = 64;
+  packed_row_ = (static_cast<size_t>(width_) + 2 * kWindowRadius) / kBits + 2;
+  for (size_t k = 0; k < packed_.size(); ++k) {
+    packed_[k].assign(packed_row_ * (static_cast<size_t>(height_) + 2 * kWindowRadius), 0);
+    for (int y = 0; y < height_; ++y) {
+      uint64_t* const row = &packed_[k][static_cast<size_t>(y + kWindowRadius) * packed_row_];
+      for (int x = 0; x < width_; ++x) {
+        const auto bit = static_cast<size_t>(x + kWindowRadius);
+        row[bit / kBits] |= uint64_t{At(x, y).open >> k & 1U} << bit % kBits;
       }
     }
-  }
-  std::fill(line.begin(), line.end(), kNone);
-  for (int x = 0; x < width_; ++x) {
-    for (int y = 0; y < height_; ++y) visit(At(x, y).part, x, y);
   }
 }
 
-namespace {
-
-// One texel of a window, and its neighbour towards the centre.
-struct Inward {
-  int8_t dx, dy;
-  uint8_t index, neighbour, direction;
-};
-
-// Ring by ring.
-constexpr std::array<Inward, kWindow - 1> kInward = [] {
-  std::array<Inward, kWindow - 1> steps{};
-  size_t n = 0;
-  for (int ring = 1; ring <= kWindowRadius; ++ring) {
-    for (int dy = -ring; dy <= ring; ++dy) {
-      for (int dx = -ring; dx <= ring; dx += dy == -ring || dy == ring ? 1 : 2 * ring) {
-        constexpr std::array<uint8_t, 9> kDirection = {5, 6, 7, 4, 0, 0, 3, 2, 1};
-        const int in_x = (dx < 0) - (dx > 0), in_y = (dy < 0) - (dy > 0);
-        steps[n++] = {static_cast<int8_t>(dx), static_cast<int8_t>(dy), static_cast<uint8_t>(WindowIndex(dx, dy)),
-                      static_cast<uint8_t>(WindowIndex(dx + in_x, dy + in_y)),
-                      kDirection[static_cast<size_t>(3 * (in_y + 1) + in_x + 1)]};
-      }
-    }
+// Which texels of the window of (x, y) are connected with their neighbour in direction k < 4.
+Connections::WindowRows Connections::Open(int x, int y, size_t k) const {
+  constexpr size_t kBits = 64;
+  const size_t first = static_cast<size_t>(x), shift = first % kBits;
+  const uint64_t* word = &packed_[k][static_cast<size_t>(y) * packed_row_ + first / kBits];
+  WindowRows rows;
+  for (uint32_t& row : rows) {
+    // In two steps: by 64 bits at once nothing would be shifted.
+    row = static_cast<uint32_t>(word[0] >> shift | word[1] << 1 << (kBits - 1 - shift)) & kWholeRow;
+    word += packed_row_;
   }
-  return steps;
-}();
+  return rows;
+}
 
-}  // namespace
+// The texels of its window that are reached from (x, y): whole rows at a time, down and up until there are no more.
+Connections::WindowRows Connections::Search(int x, int y) const {
+  const WindowRows right = Open(x, y, 0), down_right = Open(x, y, 1), down = Open(x, y, 2), down_left = Open(x, y, 3);
+  WindowRows reached{}, before;
+  reached[kWindowRadius] = 1U << kWindowRadius;
+  const auto along = [&](size_t row) {
+    uint32_t last;
+    do {
+      last = reached[row];
+      reached[row] |= ((last & right[row]) << 1 | (last >> 1 & right[row])) & kWholeRow;
+    } while (reached[row] != last);
+  };
+  do {
+    before = reached;
+    for (size_t row = 0; row < kWindowSide; ++row) {
+      along(row);
+      if (row + 1 == kWindowSide) break;
+      const uint32_t from = reached[row];
+      reached[row + 1] |=
+          ((from & down[row]) | (from & down_right[row]) << 1 | (from & down_left[row]) >> 1) & kWholeRow;
+    }
+    for (size_t row = kWindowSide - 1; row-- > 0;) {
+      const uint32_t from = reached[row + 1];
+      reached[row] |= ((from & down[row]) | (from >> 1 & down_right[row]) | (from << 1 & down_left[row])) & kWholeRow;
+      along(row);
+    }
+  } while (reached != before);
+  return reached;
+}
 
 WindowSet Connections::CutOff(int x, int y) const {
-  WindowSet same, reached;
   const uint16_t part = PartOf(x, y);
-  if (part == 0 || convex_[part] || IsOpen(x, y)) return {};
-  // Straight towards the centre: around a convex chart's border that is all there is.
-  reached[WindowIndex(0, 0)] = true;
-  for (const Inward& step : kInward) {
-    if (!Contains(x + step.dx, y + step.dy)) continue;
-    const Cell& cell = At(x + step.dx, y + step.dy);
-    if (cell.part != part) continue;
-    same[step.index] = true;
-    reached[step.index] = reached[step.neighbour] && (cell.open >> step.direction & 1) != 0;
-  }
-  if ((same & ~reached).none()) return {};
-  return same & ~Search(x, y);
-}
-
-// The texels of its window that are reached from (x, y).
-WindowSet Connections::Search(int x, int y) const {
-  WindowSet reached;
-  std::array<std::array<int8_t, 2>, kWindow> waiting;
-  size_t count = 0;
-  const auto reach = [&](int dx, int dy) {
-    const size_t index = WindowIndex(dx, dy);
-    if (reached[index]) return;
-    reached[index] = true;
-    waiting[count++] = {static_cast<int8_t>(dx), static_cast<int8_t>(dy)};
-  };
-  reach(0, 0);
-  while (count > 0) {
-    const auto [dx, dy] = waiting[--count];
-    const uint8_t open = At(x + dx, y + dy).open;
-    for (size_t k = 0; k < kNeighbours.size(); ++k) {
-      if (!(open >> k & 1)) continue;
-      const int nx = dx + kNeighbours[k][0], ny = dy + kNeighbours[k][1];
-      if (std::max(std::abs(nx), std::abs(ny)) <= kWindowRadius) reach(nx, ny);
+  if (part == 0 || IsOpen(x, y)) return {};
+  const WindowRows reached = Search(x, y);
+  WindowSet cut;
+  for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
+    for (uint32_t rest = ~reached[static_cast<size_t>(dy + kWindowRadius)] & kWholeRow; rest != 0; rest &= rest - 1) {
+      const int dx = std::countr_zero(rest) - kWindowRadius;
+      if (Contains(x + dx, y + dy) && PartOf(x + dx, y + dy) == part) cut[WindowIndex(dx, dy)] = true;
     }
   }
-  return reached;
+  return cut;
 }
 
 }  // namespace bakewell

@@ -55,15 +55,19 @@ class Connections {
   }
   // All texels of its window are connected with each other.
   bool IsOpen(int x, int y) const { return At(x, y).room >= kWindowRadius; }
-  WindowSet Search(int x, int y) const;
+  // Rows of a window, from the top; bit i: dx = i - kWindowRadius.
+  using WindowRows = std::array<uint32_t, kWindowSide>;
+  WindowRows Open(int x, int y, size_t k) const;
+  WindowRows Search(int x, int y) const;
   void MeasureRoom();
   void NumberParts();
-  void FindConvex();
+  void PackOpen();
 
   int width_, height_;
   std::vector<Cell> cells_;
-  // By number: between any two of its texels there is a path that never turns back, so that no window cuts it.
-  std::vector<bool> convex_;
+  // Of the first four directions, bit k of Cell::open; row by row, a window's radius wider on all sides.
+  std::array<std::vector<uint64_t>, 4> packed_;
+  size_t packed_row_ = 0;  // words
 };
 
 }  // namespace bakewell

@@ -107,24 +107,34 @@ bool IsMet(const Demand& demand) {
   return !any || sum <= static_cast<double>(demand.texels);
 }
 
-std::vector<float> TilePool::Mean(std::span<const float> values) const {
-  std::vector<float> means(values.size(), 0);
-  for (size_t i = 0; i < values.size(); ++i) {
-    const Texel& texel = map_.texels[begin_ + i];
-    const PageSize page = map_.pages[texel.page];
-    float sum = 0;
-    int count = 0;
+TilePool::TilePool(const TexelMap& map, uint32_t begin, const std::vector<bool>& valid) : places_(valid.size()) {
+  std::map<int32_t, uint16_t> charts;
+  for (size_t i = 0; i < places_.size(); ++i) {
+    const Texel& texel = map.texels[begin + i];
+    Place& place = places_[i];
+    place.valid = valid[i];
+    place.chart = charts.try_emplace(texel.chart, static_cast<uint16_t>(charts.size())).first->second;
+    const PageSize page = map.pages[texel.page];
     for (int y = std::max(0, texel.y - 1); y <= std::min(page.height - 1, texel.y + 1); ++y) {
       for (int x = std::max(0, texel.x - 1); x <= std::min(page.width - 1, texel.x + 1); ++x) {
         const size_t at = static_cast<size_t>(y) * static_cast<size_t>(page.width) + static_cast<size_t>(x);
-        const int64_t j = int64_t{map_.texel_at[texel.page][at]} - begin_;
-        if (j < 0 || j >= std::ssize(values) || !valid_[static_cast<size_t>(j)]) continue;
-        if (map_.texels[begin_ + static_cast<size_t>(j)].chart != texel.chart) continue;
-        sum += values[static_cast<size_t>(j)];
-        ++count;
+        const int64_t j = int64_t{map.texel_at[texel.page][at]} - begin;
+        if (j < 0 || j >= std::ssize(valid) || !valid[static_cast<size_t>(j)]) continue;
+        if (map.texels[begin + static_cast<size_t>(j)].chart != texel.chart) continue;
+        place.near[place.near_count++] = static_cast<uint16_t>(j);
       }
     }
-    if (count > 0) means[i] = sum / static_cast<float>(count);
+  }
+  charts_ = charts.size();
+}
+
+std::vector<float> TilePool::Mean(std::span<const float> values) const {
+  std::vector<float> means(values.size(), 0);
+  for (size_t i = 0; i < values.size(); ++i) {
+    const Place& place = places_[i];
+    float sum = 0;
+    for (size_t k = 0; k < place.near_count; ++k) sum += values[place.near[k]];
+    if (place.near_count > 0) means[i] = sum / static_cast<float>(place.near_count);
   }
   return means;
 }
@@ -133,12 +143,12 @@ std::vector<float> TilePool::Variance(std::vector<float> variance, std::span<con
   struct Sum {
     float variance = 0, texels = 0;
   };
-  std::map<int32_t, Sum> charts;
+  std::vector<Sum> charts(charts_);
   const auto count = [&](size_t i) { return static_cast<float>(std::max(1, samples[i])); };
   for (size_t i = 0; i < variance.size(); ++i) {
     variance[i] *= count(i);
-    if (!valid_[i]) continue;
-    Sum& chart = charts[map_.texels[begin_ + i].chart];
+    if (!places_[i].valid) continue;
+    Sum& chart = charts[places_[i].chart];
     chart.variance += variance[i];
     chart.texels += 1;
   }
@@ -146,7 +156,7 @@ std::vector<float> TilePool::Variance(std::vector<float> variance, std::span<con
   for (size_t i = 0; i < variance.size(); ++i) {
     // Where all around there is nothing, there is nothing rare.
     if (!(variance[i] > 0)) continue;
-    const Sum& chart = charts[map_.texels[begin_ + i].chart];
+    const Sum& chart = charts[places_[i].chart];
     const float share = kChartsSamples / (kChartsSamples + kNeighbourhoodTexels * count(i));
     variance[i] = ((1 - share) * variance[i] + share * chart.variance / chart.texels) / count(i);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <limits>
 #include <span>
 #include <vector>
@@ -41,8 +42,7 @@ bool IsMet(const Demand& demand);
 // What texels of a tile say together. Vectors have one element a texel, from texel `begin` on.
 class TilePool {
  public:
-  TilePool(const TexelMap& map, uint32_t begin, std::vector<bool> valid)
-      : map_(map), begin_(begin), valid_(std::move(valid)) {}
+  TilePool(const TexelMap& map, uint32_t begin, const std::vector<bool>& valid);
   // Over each texel and those of its eight neighbours that are of the tile, valid and of the same chart.
   std::vector<float> Mean(std::span<const float> values) const;
   // The variance that each texel's number of samples leaves, where neighbours tell what one sample's is, and the
@@ -51,9 +51,14 @@ class TilePool {
   std::vector<float> Variance(std::vector<float> variance, std::span<const int> samples) const;
 
  private:
-  const TexelMap& map_;
-  const uint32_t begin_;
-  const std::vector<bool> valid_;
+  struct Place {
+    std::array<uint16_t, 9> near{};  // of the tile
+    uint8_t near_count = 0;
+    bool valid = false;
+    uint16_t chart = 0;  // of those of the tile
+  };
+  std::vector<Place> places_;
+  size_t charts_ = 0;
 };
 
 }  // namespace bakewell

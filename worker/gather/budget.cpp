@@ -77,22 +77,24 @@ void TileBudget::CorrectVariances(std::vector<TexelWork>& all) const {
 void TileBudget::Decide(std::vector<TexelWork>& all) {
   CorrectVariances(all);
   Part direct, indirect;
-  std::vector<bool> valid;
   for (const TexelWork& work : all) {
     direct.Add(work.direct.Irradiance(), work.DirectVariance(), work.direct_samples);
     indirect.Add(work.indirect.Irradiance(), work.IndirectVariance(), work.indirect_samples);
-    valid.push_back(work.valid);
     direct_.changed += work.direct_active ? 1 : 0;
     indirect_.changed += work.indirect_active ? 1 : 0;
   }
-  const TilePool pool(map_, begin_, std::move(valid));
-  direct.pooled = pool.Variance(direct.variance, direct.samples);
-  indirect.pooled = pool.Variance(indirect.variance, indirect.samples);
+  if (!pool_) {
+    std::vector<bool> valid;
+    for (const TexelWork& work : all) valid.push_back(work.valid);
+    pool_.emplace(map_, begin_, valid);
+  }
+  direct.pooled = pool_->Variance(direct.variance, direct.samples);
+  indirect.pooled = pool_->Variance(indirect.variance, indirect.samples);
   // A stray sample must not raise its own tolerance: neighbours or the smoothed light judge.
-  Demand demand = DemandOf(all, direct, indirect, pool.Mean(Sum(direct.value, indirect.value)));
+  Demand demand = DemandOf(all, direct, indirect, pool_->Mean(Sum(direct.value, indirect.value)));
   if (options_.filter && options_.target_error > 0 && !IsMet(demand)) {
-    direct_.Apply(*tile_, pool, direct);
-    indirect_.Apply(*tile_, pool, indirect);
+    direct_.Apply(*tile_, *pool_, direct);
+    indirect_.Apply(*tile_, *pool_, indirect);
     demand = DemandOf(all, direct, indirect, Sum(direct.value, indirect.value));
   }
   if (!spare_) spare_ = kSpare * static_cast<double>(demand.texels);

@@ -53,6 +53,7 @@ class TileBudget {
   const uint32_t begin_;
   const GatherOptions& options_;
   std::optional<SmoothTile> tile_;
+  std::optional<TilePool> pool_;
   Filtered direct_, indirect_;
   std::optional<double> spare_;  // of Allot
 };
