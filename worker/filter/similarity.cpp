@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 #include "core/base/check.h"
 
@@ -14,6 +15,23 @@ constexpr float kRising = 0.6f;      // of pairs, whose weight falls where they 
 constexpr float kRidge = 1e-3f;      // squared texels; texels in one line give an answer too
 constexpr float kTiny = 1e-36f;      // variance of what has none
 constexpr size_t kMostRow = 64;
+
+// Texels of a row side by side. The last of a row may lie beyond it, where they are of no use and do no harm.
+constexpr size_t kLanes = 8;
+using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
+using IntLanes = int32_t __attribute__((vector_size(kLanes * sizeof(int32_t))));
+Lanes Load(const float* from) {
+  Lanes lanes;
+  std::memcpy(&lanes, from, sizeof(lanes));
+  return lanes;
+}
+IntLanes Load(const int32_t* from) {
+  IntLanes lanes;
+  std::memcpy(&lanes, from, sizeof(lanes));
+  return lanes;
+}
+void Store(Lanes lanes, float* to) { std::memcpy(to, &lanes, sizeof(lanes)); }
+using Row = std::array<float, kMostRow + kLanes>;
 
 // Weights by distance, by WindowIndex.
 const std::array<float, kWindow>& NearnessTable() {
@@ -40,12 +58,12 @@ SimilarTexels::SimilarTexels(int width, int height)
     : width_(width),
       height_(height),
       stride_(static_cast<size_t>(width) + 2 * kHalo),
-      row_(static_cast<size_t>(width)),
+      row_((static_cast<size_t>(width) + kLanes - 1) / kLanes * kLanes),
       plane_(row_ * static_cast<size_t>(height)),
       weights_(kWindow * plane_),
       means_(plane_) {
   BAKEWELL_CHECK(stride_ <= kMostRow);
-  const size_t size = stride_ * (static_cast<size_t>(height) + 2 * kHalo);
+  const size_t size = stride_ * (static_cast<size_t>(height) + 2 * kHalo) + 2 * kLanes;
   value_.resize(size), variance_.resize(size), pooled_.resize(size), part_.resize(size);
 }
 
@@ -90,22 +108,20 @@ void SimilarTexels::Compare(bool around) {
 }
 
 void SimilarTexels::Differences(int y, int dx, int dy, int first, int end, float* squares, float* counts) const {
-  std::array<float, kMostRow> square, count;
+  Row square, count;
   const size_t from = Place(first - 1, y), n = static_cast<size_t>(end - first) + 2;
   const size_t to = Place(first - 1 + dx, y + dy);
-  const float *value = &value_[from], *other_value = &value_[to], *pooled = &pooled_[from],
-              *other_pooled = &pooled_[to];
-  const int32_t *part = &part_[from], *other_part = &part_[to];
-  for (size_t i = 0; i < n; ++i) {
-    const float d = value[i] - other_value[i];
-    const float ratio = d * d / (pooled[i] + other_pooled[i] + kTiny);
-    const bool alike = part[i] == other_part[i] && part[i] != 0;
-    square[i] = alike ? ratio : 0.0f;
-    count[i] = alike ? 1.0f : 0.0f;
+  for (size_t i = 0; i < n; i += kLanes) {
+    const Lanes d = Load(&value_[from + i]) - Load(&value_[to + i]);
+    const Lanes ratio = d * d / (Load(&pooled_[from + i]) + Load(&pooled_[to + i]) + kTiny);
+    const IntLanes part = Load(&part_[from + i]);
+    const IntLanes alike = (part == Load(&part_[to + i])) & (part != 0);
+    Store(alike ? ratio : Lanes{}, &square[i]);
+    Store(alike ? Lanes{} + 1 : Lanes{}, &count[i]);
   }
-  for (size_t i = 0; i + 2 < n; ++i) {
-    squares[i] = square[i] + square[i + 1] + square[i + 2];
-    counts[i] = count[i] + count[i + 1] + count[i + 2];
+  for (size_t i = 0; i + 2 < n; i += kLanes) {
+    Store(Load(&square[i]) + Load(&square[i + 1]) + Load(&square[i + 2]), &squares[i]);
+    Store(Load(&count[i]) + Load(&count[i + 1]) + Load(&count[i + 2]), &counts[i]);
   }
 }
 
@@ -115,22 +131,24 @@ void SimilarTexels::CompareAt(int dx, int dy, bool around) {
   const int end_x = around ? width_ + std::max(0, -dx) : width_ - std::max(0, dx);
   const int first_y = around ? -dy : 0, end_y = around ? height_ : height_ - dy;
   const float nearness = Nearness(dx, dy);
-  std::array<std::array<float, kMostRow>, 3> squares, counts;
-  std::array<float, kMostRow> weight;
+  std::array<Row, 3> squares, counts;
+  Row weight;
   const auto n = static_cast<size_t>(std::max(0, end_x - first_x));
   const auto slot = [](int y) { return static_cast<size_t>((y + 3 * kHalo) % 3); };
   for (int below = first_y - 1; below <= end_y; ++below) {
     Differences(below, dx, dy, first_x, end_x, squares[slot(below)].data(), counts[slot(below)].data());
     const int y = below - 1;
     if (y < first_y) continue;
-    const auto add = [&](const std::array<std::array<float, kMostRow>, 3>& rows, size_t i) {
-      return rows[slot(y - 1)][i] + rows[slot(y)][i] + rows[slot(below)][i];
+    const auto add = [&](const std::array<Row, 3>& rows, size_t i) {
+      return Load(&rows[slot(y - 1)][i]) + Load(&rows[slot(y)][i]) + Load(&rows[slot(below)][i]);
     };
-    const int32_t *part = &part_[Place(first_x, y)], *other_part = &part_[Place(first_x + dx, y + dy)];
-    for (size_t i = 0; i < n; ++i) {
-      const float square = add(squares, i), count = add(counts, i);
-      const float like = Likeness(square / std::max(count, 1.0f));
-      weight[i] = part[i] == other_part[i] && part[i] != 0 ? like * nearness : 0.0f;
+    const size_t from = Place(first_x, y), to = Place(first_x + dx, y + dy);
+    for (size_t i = 0; i < n; i += kLanes) {
+      const Lanes square = add(squares, i), count = add(counts, i);
+      const Lanes like = Likeness(square / (count > 1 ? count : Lanes{} + 1));
+      const IntLanes part = Load(&part_[from + i]);
+      const IntLanes alike = (part == Load(&part_[to + i])) & (part != 0);
+      Store(alike ? like * nearness : Lanes{}, &weight[i]);
     }
     const auto keep = [&](size_t index, int row, int shift) {
       if (row < 0 || row >= height_) return;
@@ -152,77 +170,68 @@ void SimilarTexels::CutOff(int x, int y, const WindowSet& cut) {
 }
 
 void SimilarTexels::Regress(float margin) {
-  std::array<float, kMostRow> n, x, y, xx, xy, yy;
-  for (size_t row = 0; row < plane_; row += row_) {
-    const float* center = &weights_[WindowIndex(0, 0) * plane_ + row];
-    for (auto* sum : {&x, &y, &xx, &xy, &yy}) sum->fill(0);
-    std::copy_n(center, row_, n.begin());
+  for (size_t at = 0; at < plane_; at += kLanes) {
+    Lanes n = Load(&weights_[WindowIndex(0, 0) * plane_ + at]), x{}, y{}, xx{}, xy{}, yy{};
     // Opposite texels at a time.
     for (size_t index = 0; index < kWindow / 2; ++index) {
       const float dx = OffsetX(index), dy = OffsetY(index);
-      const float* weight = &weights_[index * plane_ + row];
-      const float* opposite = &weights_[(kWindow - 1 - index) * plane_ + row];
-      for (size_t i = 0; i < row_; ++i) {
-        const float sum = weight[i] + opposite[i], difference = weight[i] - opposite[i];
-        n[i] += sum;
-        x[i] += difference * dx;
-        y[i] += difference * dy;
-        xx[i] += sum * (dx * dx);
-        xy[i] += sum * (dx * dy);
-        yy[i] += sum * (dy * dy);
-      }
+      const Lanes weight = Load(&weights_[index * plane_ + at]);
+      const Lanes opposite = Load(&weights_[(kWindow - 1 - index) * plane_ + at]);
+      const Lanes sum = weight + opposite, difference = weight - opposite;
+      n += sum;
+      x += difference * dx;
+      y += difference * dy;
+      xx += sum * (dx * dx);
+      xy += sum * (dx * dy);
+      yy += sum * (dy * dy);
     }
     // The plane through the window's mean, at its centre: by weights that are linear in dx and dy.
-    for (size_t i = 0; i < row_; ++i) {
-      const float one = 1 / n[i], mean_x = x[i] * one, mean_y = y[i] * one;
-      const float cxx = xx[i] * one - mean_x * mean_x + kRidge, cyy = yy[i] * one - mean_y * mean_y + kRidge;
-      const float cxy = xy[i] * one - mean_x * mean_y, scale = kSlopeShare / (cxx * cyy - cxy * cxy);
-      const float gx = scale * (cyy * mean_x - cxy * mean_y), gy = scale * (cxx * mean_y - cxy * mean_x);
-      n[i] = one * (1 + gx * mean_x + gy * mean_y);
-      x[i] = -one * gx;
-      y[i] = -one * gy;
-    }
+    const Lanes one = 1 / n, mean_x = x * one, mean_y = y * one;
+    const Lanes cxx = xx * one - mean_x * mean_x + kRidge, cyy = yy * one - mean_y * mean_y + kRidge;
+    const Lanes cxy = xy * one - mean_x * mean_y, scale = kSlopeShare / (cxx * cyy - cxy * cxy);
+    const Lanes gx = scale * (cyy * mean_x - cxy * mean_y), gy = scale * (cxx * mean_y - cxy * mean_x);
+    n = one * (1 + gx * mean_x + gy * mean_y);
+    x = -one * gx;
+    y = -one * gy;
     for (size_t index = 0; index < kWindow; ++index) {
-      const float dx = OffsetX(index), dy = OffsetY(index);
-      float* weight = &weights_[index * plane_ + row];
-      for (size_t i = 0; i < row_; ++i) weight[i] *= n[i] + x[i] * dx + y[i] * dy;
+      float* const weight = &weights_[index * plane_ + at];
+      Store(Load(weight) * (n + x * OffsetX(index) + y * OffsetY(index)), weight);
     }
   }
   for (int row = 0; row < height_; ++row) Average(row, margin);
 }
 
 void SimilarTexels::Average(int y, float margin) {
-  std::array<float, kMostRow> moved{}, square{}, variance{}, rise{}, rise_moved{};
   const size_t row = static_cast<size_t>(y) * row_;
-  const float *own_value = &value_[Place(0, y)], *own_variance = &pooled_[Place(0, y)];
-  for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
-    for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
-      const float* weights = &weights_[WindowIndex(dx, dy) * plane_ + row];
-      const float *value = &value_[Place(dx, y + dy)], *pooled = &pooled_[Place(dx, y + dy)];
-      for (size_t i = 0; i < row_; ++i) {
-        const float weight = weights[i], by = value[i] - own_value[i], weighted = weight * by;
-        const float change = weighted / (pooled[i] + own_variance[i] + kTiny);
-        moved[i] += weighted;
-        square[i] += weight * weight;
-        variance[i] += weight * weight * pooled[i];
-        rise[i] += change;
-        rise_moved[i] += change * by;
+  for (size_t begin = 0; begin < row_; begin += kLanes) {
+    Lanes moved{}, square{}, variance{}, rise{}, rise_moved{};
+    const size_t own_at = Place(static_cast<int>(begin), y);
+    const Lanes own_value = Load(&value_[own_at]), own_variance = Load(&pooled_[own_at]);
+    for (int dy = -kWindowRadius; dy <= kWindowRadius; ++dy) {
+      for (int dx = -kWindowRadius; dx <= kWindowRadius; ++dx) {
+        const size_t at = Place(static_cast<int>(begin) + dx, y + dy);
+        const Lanes weight = Load(&weights_[WindowIndex(dx, dy) * plane_ + row + begin]);
+        const Lanes pooled = Load(&pooled_[at]), by = Load(&value_[at]) - own_value, weighted = weight * by;
+        const Lanes change = weighted / (pooled + own_variance + kTiny);
+        moved += weighted;
+        square += weight * weight;
+        variance += weight * weight * pooled;
+        rise += change;
+        rise_moved += change * by;
       }
     }
-  }
-  const float* own = &weights_[WindowIndex(0, 0) * plane_ + row];
-  for (size_t i = 0; i < row_; ++i) {
-    Mean& mean = means_[row + i];
-    mean.value = own_value[i] + moved[i];
+    const Lanes own = Load(&weights_[WindowIndex(0, 0) * plane_ + row + begin]);
     // The weights' own derivative, beside the texel's weight.
     constexpr float kPatch = 9;
-    mean.follows = own[i] + kRising * 2 / (kPatch * kTolerance * kTolerance) * (rise_moved[i] - rise[i] * moved[i]);
-    const float chosen = mean.follows * mean.follows - own[i] * own[i];
-    mean.square = square[i] + chosen;
-    mean.variance = variance[i] + chosen * own_variance[i];
+    const Lanes follows = own + kRising * 2 / (kPatch * kTolerance * kTolerance) * (rise_moved - rise * moved);
+    const Lanes chosen = follows * follows - own * own, all_variance = variance + chosen * own_variance;
     // Stein (1981): the mean square error is that of what the texel moved, less its variance, and twice what it
     // follows.
-    mean.bias_square = moved[i] * moved[i] - (own_variance[i] * (1 - 2 * mean.follows) + mean.variance) / margin;
+    const Lanes bias_square = moved * moved - (own_variance * (1 - 2 * follows) + all_variance) / margin;
+    for (size_t i = 0; i < kLanes; ++i) {
+      means_[row + begin + i] = {own_value[i] + moved[i], follows[i], square[i] + chosen[i], all_variance[i],
+                                 bias_square[i]};
+    }
   }
 }
 

@@ -14,10 +14,12 @@ namespace bakewell {
 // kTolerance squared of that, for 1 / e.
 inline constexpr float kTolerance = 0.9f;
 // Weight by the mean of squared differences over their variances: exp(-(ratio - 1) / kTolerance^2), but for what is
-// next to nothing.
-inline float Likeness(float ratio) {
-  const float root = std::max(0.0f, 1 - std::max(0.0f, ratio - 1) * (1 / (8 * kTolerance * kTolerance)));
-  const float root2 = root * root, root4 = root2 * root2;
+// next to nothing. T: float, or several side by side.
+template <typename T>
+T Likeness(T ratio) {
+  const T beyond = ratio - 1, fall = (beyond > 0 ? beyond : T{}) * (1 / (8 * kTolerance * kTolerance));
+  const T left = 1 - fall, root = left > 0 ? left : T{};
+  const T root2 = root * root, root4 = root2 * root2;
   return root4 * root4;
 }
 // Weight by the square of the distance [texels].
@@ -77,7 +79,7 @@ class SimilarTexels {
 
   int width_, height_;
   size_t stride_;       // of what is put
-  size_t row_, plane_;  // of weights
+  size_t row_, plane_;  // of weights; rows of whole lanes
   std::vector<float> value_, variance_, pooled_;
   std::vector<int32_t> part_;
   std::vector<float> weights_;  // kWindow planes
