@@ -86,7 +86,7 @@ void AddSharedFlags(CLI::App& command, BakeFlags& flags) {
 
 void AddBakeOnlyFlags(CLI::App& command, BakeFlags& flags) {
   command.add_option("--quality", flags.quality, "Noise against time (medium)")->check(OneOf(QualityNames()));
-  command.add_option("--target-error", flags.target_error, "Relative standard error at which a texel stops: 0.02");
+  command.add_option("--target-error", flags.target_error, "Relative error that the bake is to come to, about: 0.02");
   command.add_option("--samples", flags.max_samples, "Most gather rays a texel, a power of two");
   command.add_option("--photons", flags.photons,
                      "Photons to emit; without it as many as the error that is asked for needs");

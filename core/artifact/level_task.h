@@ -25,7 +25,7 @@ struct KindName {
   uint32_t code_version;
 };
 inline constexpr KindName kChart{"chart/layout", 2};
-inline constexpr KindName kSurvey{"texel/survey", 15};
+inline constexpr KindName kSurvey{"texel/survey", 16};
 inline constexpr KindName kEmit{"photon/emit", 12};
 inline constexpr KindName kDensity{"photon/density", 8};
 inline constexpr KindName kGather{"gather/tiles", 35};

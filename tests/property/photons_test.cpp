@@ -73,9 +73,9 @@ TEST(PhotonsFor, ASmallerErrorNeedsMoreAndANumberOfOnesOwnIsKept) {
 TEST(PhotonsFor, HalfTheErrorNeedsFourTimesThePhotonsWhereTheirNoiseDecides) {
   const Prepared room(SlitLevel(24, 0.02));
   BakeSettings settings;
-  settings.target_error = 0.016f;
+  settings.target_error = 0.014f;
   const auto coarse = static_cast<double>(room.Needed(settings));
-  settings.target_error = 0.008f;
+  settings.target_error = 0.007f;
   EXPECT_NEAR(static_cast<double>(room.Needed(settings)) / coarse, 4, 0.01);
 }
 

@@ -91,7 +91,7 @@ Connections::WindowRows Connections::Open(int x, int y, size_t k) const {
   const uint64_t* word = &packed_[k][static_cast<size_t>(y) * packed_row_ + first / kBits];
   WindowRows rows;
   for (uint32_t& row : rows) {
-    // In two steps: by 64 bits at once nothing would be shifted.
+    // In two steps: a shift by 64 is not defined.
     row = static_cast<uint32_t>(word[0] >> shift | word[1] << 1 << (kBits - 1 - shift)) & kWholeRow;
     word += packed_row_;
   }

@@ -108,7 +108,7 @@ void SimilarTexels::Compare(bool around) {
 }
 
 void SimilarTexels::Differences(int y, int dx, int dy, int first, int end, float* squares, float* counts) const {
-  Row square, count;
+  Row square{}, count{};
   const size_t from = Place(first - 1, y), n = static_cast<size_t>(end - first) + 2;
   const size_t to = Place(first - 1 + dx, y + dy);
   for (size_t i = 0; i < n; i += kLanes) {

@@ -87,5 +87,28 @@ TEST(TileBudget, FewBrightTexelsDoNotTakeTheErrorThatDimOnesLeave) {
   EXPECT_EQ(GoOn(light, options, deviation), 0);
 }
 
+// Symptom: beside a window's patch on a floor, calm texels went on at any number of samples, lest they had missed it.
+TEST(TilePool, WhatIsRareCountsForLessTheMoreSamplesMissedIt) {
+  SceneBuilder builder({kTileSide, kTileSide});
+  builder.AddQuad({0, 0, 0}, {16, 0, 0}, {0, 0, -16}, {.page = {0, 0, kTileSide, kTileSide}});
+  const PreparedLevel prepared = PrepareInMemory(builder.Build(), {});
+  const TexelMap& map = prepared.texels;
+  const TilePool pool(map, 0, std::vector<bool>(map.texels.size(), true));
+  constexpr float kCalm = 1e-6f, kNoisy = 4;  // variance of one sample
+  const auto of_calm = [&](int samples) {
+    std::vector<float> variance;
+    size_t calm = 0;
+    for (const Texel& texel : map.texels) {
+      if (texel.x == 2 && texel.y == 8) calm = variance.size();
+      variance.push_back((texel.x < 12 ? kCalm : kNoisy) / static_cast<float>(samples));
+    }
+    const std::vector<float> pooled = pool.Variance(variance, std::vector<int>(variance.size(), samples));
+    return pooled[calm] * static_cast<float>(samples);
+  };
+  // A quarter of the chart is noisy.
+  EXPECT_NEAR(of_calm(4), 0.1f * kNoisy / 4, 1e-3f);
+  EXPECT_NEAR(of_calm(64), kNoisy / 4 * 4 / (4 + 9 * 64), 1e-4f);
+}
+
 }  // namespace
 }  // namespace bakewell
