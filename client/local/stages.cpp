@@ -25,7 +25,7 @@ absl::StatusOr<Photons> TracePhotons(const PreparedLevel& prepared, const BakeSe
     return EmissionGuide::StartsIn(world, prepared.layout, prepared.texels, walks, settings.seed);
   };
   const PhotonScene scene{world, lights, std::ssize(prepared.texels.texels), starts};
-  const auto stage = BuildPhotonStage(scene, PhotonsFor(scene, settings, progress), settings.seed);
+  const auto stage = BuildPhotonStage(scene, PhotonsFor(scene, settings, progress).photons, settings.seed);
   const PhotonPlan& plan = stage->plan;
   result.cells = stage->cells;
   PhotonMap map;

@@ -40,6 +40,7 @@ std::string Serialize(const Survey& survey) {
   FieldWriter writer;
   writer.Put(survey.texels);
   writer.Put(survey.photons);
+  writer.Put(uint32_t{survey.has_cache});
   writer.Put(survey.overlapping_texels);
   for (const int64_t count : {survey.opaque_alpha.skipped, survey.opaque_alpha.of}) {
     writer.Put(static_cast<uint64_t>(count));
@@ -54,6 +55,7 @@ absl::StatusOr<Survey> ParseSurvey(std::string_view bytes) {
   Survey survey;
   survey.texels = reader.Get<uint64_t>();
   survey.photons = reader.Get<uint64_t>();
+  survey.has_cache = reader.Get<uint32_t>() != 0;
   survey.overlapping_texels = reader.Get<uint64_t>();
   for (int64_t* count : {&survey.opaque_alpha.skipped, &survey.opaque_alpha.of}) {
     *count = static_cast<int64_t>(reader.Get<uint64_t>());

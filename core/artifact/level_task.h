@@ -25,7 +25,7 @@ struct KindName {
   uint32_t code_version;
 };
 inline constexpr KindName kChart{"chart/layout", 2};
-inline constexpr KindName kSurvey{"texel/survey", 16};
+inline constexpr KindName kSurvey{"texel/survey", 17};
 inline constexpr KindName kEmit{"photon/emit", 12};
 inline constexpr KindName kDensity{"photon/density", 8};
 inline constexpr KindName kGather{"gather/tiles", 35};
@@ -63,6 +63,7 @@ absl::StatusOr<Settings> ParseSettings(std::string_view bytes);
 // What the planner has to know about the texels of a layout.
 struct Survey {
   uint64_t texels = 0, photons = 0;
+  bool has_cache = false;                  // the survey's pilot flew as many: its task makes what "photon/density" does
   uint64_t overlapping_texels = 0;         // covered by more than one chart
   SkipCount opaque_alpha;                  // triangles
   std::vector<uint32_t> texels_of_tile;    // tile_count

@@ -118,7 +118,10 @@ std::vector<TileGroup> GroupTiles(const level_task::Survey& survey, uint32_t beg
   return groups;
 }
 
-TaskKey AddPhotons(const Context& context, const level_task::Survey& survey, TaskGraph& graph) {
+// Whose outputs are the radiance cache and its totals.
+TaskKey AddPhotons(const Context& context, const TaskKey& surveyor, const level_task::Survey& survey,
+                   TaskGraph& graph) {
+  if (survey.has_cache) return surveyor;
   const double cost_us = kPhotonUs * static_cast<double>(survey.photons);
   const uint32_t batches = static_cast<uint32_t>(std::clamp(cost_us / context.task_us, 1.0, 256.0));
   std::vector<TaskKey> makers;
@@ -188,7 +191,7 @@ absl::Status CheckSurvey(const level_task::Survey& survey) {
 }
 
 absl::StatusOr<level_task::Survey> SurveyFrom(const TaskOutputs& done, const BlobReader& read) {
-  if (done.size() != 1) return absl::InternalError("the texel survey has no result");
+  if (done.empty()) return absl::InternalError("the texel survey has no result");
   BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, read(done[0].digest));
   BAKEWELL_ASSIGN_OR_RETURN(level_task::Survey survey, level_task::ParseSurvey(bytes));
   BAKEWELL_RETURN_IF_ERROR(CheckSurvey(survey));
@@ -255,7 +258,8 @@ absl::StatusOr<TaskGraph> LevelPlanner::Continue(const PlanRequest& request, con
   context.settings.photons = static_cast<int64_t>(survey.photons);
   const double texel_us = kSampleUs * SamplesOf(context.settings.quality);
   TaskGraph graph;
-  const TaskKey cache = AddPhotons(context, survey, graph);
+  const TaskKey surveyor = so_far[0].tasks[1].key;
+  const TaskKey cache = AddPhotons(context, surveyor, survey, graph);
   std::vector<TaskKey> pages;
   uint32_t begin = 0;
   for (uint32_t page = 0; page < survey.tile_end_of_page.size(); ++page) {
@@ -265,7 +269,7 @@ absl::StatusOr<TaskGraph> LevelPlanner::Continue(const PlanRequest& request, con
   }
   PlannedTask report = MakeTask(context, level_task::kReport, 0, 0, kReportUs);
   report.spec.inputs.clear();
-  Need(report, "survey", so_far[0].tasks[1].key, "survey");
+  Need(report, "survey", surveyor, "survey");
   Need(report, "totals", cache, "totals");
   for (size_t i = 0; i < pages.size(); ++i) Need(report, absl::StrCat("tally", i), pages[i], "tally");
   graph.deliver.push_back(Add(graph, std::move(report)));

@@ -31,7 +31,7 @@ struct Prepared {
   int64_t Needed(BakeSettings settings) const {
     settings.seed = kSeed;
     const SilentProgress progress;
-    return With([&](const PhotonScene& scene) { return PhotonsFor(scene, settings, progress); });
+    return With([&](const PhotonScene& scene) { return PhotonsFor(scene, settings, progress).photons; });
   }
   GatherOutlook LookAheadWith(int64_t photons, uint32_t seed) const {
     return With([&](const PhotonScene& scene) {

@@ -81,6 +81,12 @@ MadeOutputs Previews(const TexelMap& map, int begin, std::span<const GatheredTil
   return outputs;
 }
 
+MadeOutputs CacheOutputs(const PhotonStage& stage, int64_t photon_rays, const RadianceCache& cache) {
+  const level_task::PhotonCounts totals{stage.plan.photons, photon_rays, cache.rays, std::ssize(stage.cells.cells()),
+                                        cache.unfaced_backs};
+  return {{"cache", SerializeCache(cache)}, {"totals", level_task::Serialize(totals)}};
+}
+
 // Photons do not depend on how well texels are to be gathered, the level not on how many photons there are.
 std::string PhotonSettings(const BakeSettings& settings) {
   BakeSettings relevant = settings;
@@ -160,9 +166,12 @@ absl::StatusOr<std::shared_ptr<const Level>> LevelExecutor::LevelOf(const Work& 
   });
 }
 
-absl::StatusOr<std::shared_ptr<const PhotonStage>> LevelExecutor::PhotonStageOf(const Work& work, const Level& level) {
+// made: where it is known already.
+absl::StatusOr<std::shared_ptr<const PhotonStage>> LevelExecutor::PhotonStageOf(
+    const Work& work, const Level& level, const std::shared_ptr<const PhotonStage>& made) {
   const Digest key = KeyOfInputs(work.spec, {"scene", "layout"}, PhotonSettings(work.settings));
   return photon_stages_.Get(key, [&]() -> Recent<PhotonStage>::Made {
+    if (made != nullptr) return made;
     if (work.settings.photons <= 0) return absl::InvalidArgumentError("the task does not say how many photons");
     const auto starts = [&](int walks) { return StartsOf(level, walks, work.settings.seed); };
     return BuildPhotonStage({*level.world, *level.lights, level.texels->texel_count(), starts}, work.settings.photons,
@@ -176,12 +185,14 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
   level_task::Survey survey;
   survey.texels = static_cast<uint64_t>(level->texels->texel_count());
   StopProgress progress(work.stop, nullptr);
+  PhotonChoice choice;
   InArena([&] {
     const auto starts = [&](int walks) { return StartsOf(*level, walks, work.settings.seed); };
-    survey.photons = static_cast<uint64_t>(
-        PhotonsFor({*level->world, *level->lights, level->texels->texel_count(), starts}, work.settings, progress));
+    choice = PhotonsFor({*level->world, *level->lights, level->texels->texel_count(), starts}, work.settings, progress);
   });
   if (work.stop.stop_requested()) return absl::CancelledError("stopped");
+  survey.photons = static_cast<uint64_t>(choice.photons);
+  survey.has_cache = choice.flown.has_value();
   survey.opaque_alpha = level->world->opaque_alpha();
   for (const TexelPages::PageCount& page : level->texels->pages()) {
     survey.overlapping_texels += static_cast<uint64_t>(page.overlapping_texels);
@@ -189,7 +200,15 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Survey(const Work& work) {
     survey.tile_end_of_page.push_back(static_cast<uint32_t>(page.end_tile()));
   }
   Say("texels", kSurveySteps, kSurveySteps);
-  return MadeOutputs{{"survey", level_task::Serialize(survey)}};
+  MadeOutputs outputs{{"survey", level_task::Serialize(survey)}};
+  if (choice.flown) {
+    Work next = work;
+    next.settings.photons = choice.photons;
+    BAKEWELL_RETURN_IF_ERROR(PhotonStageOf(next, *level, choice.flown->stage).status());
+    for (MadeOutput& output : CacheOutputs(*choice.flown->stage, choice.flown->rays, choice.flown->cache))
+      outputs.push_back(std::move(output));
+  }
+  return outputs;
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Emit(const Work& work) {
@@ -223,9 +242,7 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Density(const Work& work) {
   InArena([&] {
     cache = EstimateDensity(*level->world, stage->cells, map, stage->plan, DensityOf(work.settings), progress);
   });
-  const level_task::PhotonCounts totals{stage->plan.photons, map.totals.rays, cache.rays,
-                                        std::ssize(stage->cells.cells()), cache.unfaced_backs};
-  return MadeOutputs{{"cache", SerializeCache(cache)}, {"totals", level_task::Serialize(totals)}};
+  return CacheOutputs(*stage, map.totals.rays, cache);
 }
 
 absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {

@@ -45,7 +45,8 @@ class LevelExecutor final : public TaskExecutor {
     float mean_irradiance = 0, photon_flux = 0;
   };
   absl::StatusOr<std::shared_ptr<const Level>> LevelOf(const Work& work, Progress* listener = nullptr);
-  absl::StatusOr<std::shared_ptr<const PhotonStage>> PhotonStageOf(const Work& work, const Level& level);
+  absl::StatusOr<std::shared_ptr<const PhotonStage>> PhotonStageOf(
+      const Work& work, const Level& level, const std::shared_ptr<const PhotonStage>& made = nullptr);
 
   absl::StatusOr<MadeOutputs> Survey(const Work& work);
   absl::StatusOr<MadeOutputs> Emit(const Work& work);

@@ -71,10 +71,10 @@ std::shared_ptr<const PhotonStage> BuildPhotonStage(const PhotonScene& scene, in
 
 namespace {
 
-// What a gather would find over `photons`.
+// What a gather would find over its photons.
 struct Pilot {
+  FlownPhotons flown;
   GatherOutlook outlook;
-  double photons = 0;
 };
 
 Pilot FlyPilot(const PhotonScene& scene, const BakeSettings& settings, float floor_share, int64_t photons,
@@ -91,43 +91,48 @@ Pilot FlyPilot(const PhotonScene& scene, const BakeSettings& settings, float flo
                 stage->plan.photons * (part + 1) / kParts, progress, map);
   });
   NoProgress unheard;
-  const RadianceCache cache = EstimateDensity(scene.world, stage->cells, map, stage->plan, {}, unheard);
+  Pilot pilot;
+  pilot.flown = {stage, EstimateDensity(scene.world, stage->cells, map, stage->plan, DensityOf(settings), unheard),
+                 map.totals.rays};
   const LightTree tree(scene.lights);
-  return {LookAhead({scene.world, scene.lights, tree, stage->cells, cache},
-                    std::span(points).first(std::min(points.size(), kPilotPoints)), floor_share, settings.seed),
-          static_cast<double>(stage->plan.photons)};
+  pilot.outlook = LookAhead({scene.world, scene.lights, tree, stage->cells, pilot.flown.cache},
+                            std::span(points).first(std::min(points.size(), kPilotPoints)), floor_share, settings.seed);
+  return pilot;
 }
 
 // Enough for their noise, and for gather rays that need not bounce on where cells are large.
 double Needed(const Pilot& pilot, const GatherOptions& gather, int64_t texels) {
   const auto target = static_cast<double>(gather.target_error);
   const double share = kPhotonShare * target;
-  const double for_noise = pilot.outlook.photon_variance / (share * share) * pilot.photons;
+  const auto photons = static_cast<double>(pilot.flown.stage->plan.photons);
+  const double for_noise = pilot.outlook.photon_variance / (share * share) * photons;
   const double samples = std::clamp(kSetShare * pilot.outlook.ray_variance / (target * target),
                                     static_cast<double>(gather.min_samples), static_cast<double>(gather.mean_samples));
   // Where photons p^b cost as much as a bounce saves: the derivative of photons + bounces by p is zero.
   const double bounces = static_cast<double>(texels) * samples * pilot.outlook.bounces;
   const double for_cost =
-      std::pow(kBounceCost * kBounceFall * bounces * std::pow(pilot.photons, kBounceFall), 1 / (1 + kBounceFall));
+      std::pow(kBounceCost * kBounceFall * bounces * std::pow(photons, kBounceFall), 1 / (1 + kBounceFall));
   return std::max(for_noise, for_cost);
 }
 
 }  // namespace
 
-int64_t PhotonsFor(const PhotonScene& scene, const BakeSettings& settings, const Progress& progress) {
+PhotonChoice PhotonsFor(const PhotonScene& scene, const BakeSettings& settings, const Progress& progress) {
   const Budget budget = BudgetOf(settings, scene.texels);
   const auto most = static_cast<double>(budget.most_photons);
-  if (budget.most_photons == budget.least_photons) return budget.most_photons;
-  double needed = most;
+  PhotonChoice choice{budget.most_photons, {}};
+  if (budget.most_photons == budget.least_photons) return choice;
   for (int64_t pilot = kPilot; pilot <= kMostPilot && kWorthAPilot * pilot <= budget.most_photons;
        pilot *= kNextPilot) {
-    needed = Needed(FlyPilot(scene, settings, budget.gather.floor_share, pilot, progress), budget.gather, scene.texels);
-    if (progress.Cancelled()) return 0;
-    if (needed <= static_cast<double>(kTrusted * pilot) || needed > kFarBeyond * most) break;
+    Pilot flight = FlyPilot(scene, settings, budget.gather.floor_share, pilot, progress);
+    if (progress.Cancelled()) return {};
+    const double needed = Needed(flight, budget.gather, scene.texels);
+    // What is no number (light beyond what floats hold) is no reason for few.
+    choice.photons = needed < most ? std::max(static_cast<int64_t>(needed), budget.least_photons) : budget.most_photons;
+    if (choice.photons == pilot) choice.flown = std::move(flight.flown);
+    if (choice.flown || needed <= static_cast<double>(kTrusted * pilot) || needed > kFarBeyond * most) break;
   }
-  // What is no number (light beyond what floats hold) is no reason for few.
-  if (!(needed < most)) return budget.most_photons;
-  return std::max(static_cast<int64_t>(needed), budget.least_photons);
+  return choice;
 }
 
 }  // namespace bakewell
