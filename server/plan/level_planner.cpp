@@ -191,8 +191,9 @@ absl::Status CheckSurvey(const level_task::Survey& survey) {
 }
 
 absl::StatusOr<level_task::Survey> SurveyFrom(const TaskOutputs& done, const BlobReader& read) {
-  if (done.empty()) return absl::InternalError("the texel survey has no result");
-  BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, read(done[0].digest));
+  const auto output = std::find_if(done.begin(), done.end(), [](const auto& made) { return made.name == "survey"; });
+  if (output == done.end()) return absl::InternalError("the texel survey has no result");
+  BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, read(output->digest));
   BAKEWELL_ASSIGN_OR_RETURN(level_task::Survey survey, level_task::ParseSurvey(bytes));
   BAKEWELL_RETURN_IF_ERROR(CheckSurvey(survey));
   return survey;

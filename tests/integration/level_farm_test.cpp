@@ -153,6 +153,40 @@ TEST(LevelExecutor, StopsWhileALevelLoadsAndSaysHowFarItIs) {
   }
 }
 
+TEST(LevelPlanner, ASurveyThatHasTheCacheLeavesNoPhotonsToFly) {
+  const std::string scene = SampleScene();
+  const plan::PlanRequest request{Sha256Of(scene), ProtoFromSettings({}).SerializeAsString()};
+  const plan::LevelPlanner planner;
+  for (const bool has_cache : {false, true}) {
+    level_task::Survey survey;
+    survey.texels = 256;
+    survey.photons = 32768;
+    survey.has_cache = has_cache;
+    survey.texels_of_tile = {256};
+    survey.tile_end_of_page = {1};
+    const std::string bytes = level_task::Serialize(survey);
+    const plan::BlobReader read = [&](const Digest& digest) -> absl::StatusOr<std::string> {
+      return digest == request.scene ? scene : bytes;
+    };
+    const auto first = planner.Plan(request, read);
+    ASSERT_TRUE(first.ok()) << first.status();
+    const TaskOutputs done = {{"cache", {}, 0}, {"survey", Sha256Of(bytes), std::ssize(bytes)}, {"totals", {}, 0}};
+    const auto rest = planner.Continue(request, {*first}, done, read);
+    ASSERT_TRUE(rest.ok()) << rest.status();
+    int photon_tasks = 0, from_survey = 0;
+    for (const plan::PlannedTask& task : rest->tasks) {
+      photon_tasks += task.spec.kind == level_task::kEmit.kind || task.spec.kind == level_task::kDensity.kind ? 1 : 0;
+      for (const TaskInput& input : task.spec.inputs) {
+        const auto* made = std::get_if<OutputOf>(&input.source);
+        if (made == nullptr || (input.name != "cache" && input.name != "totals")) continue;
+        from_survey += made->task == first->tasks[1].key ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(photon_tasks, has_cache ? 0 : 2);
+    EXPECT_EQ(from_survey, has_cache ? 2 : 0);
+  }
+}
+
 TEST(LevelFarm, HostileSettingsAndScenesAreRefusedAtSubmit) {
   const plan::LevelPlanner planner;
   const plan::BlobReader read = [](const Digest&) -> absl::StatusOr<std::string> { return std::string("no scene"); };

@@ -10,6 +10,7 @@
 #include "tests/support/scene_builder.h"
 #include "tests/support/skip_levels.h"
 #include "worker/gather/outlook.h"
+#include "worker/level/codec.h"
 
 namespace bakewell {
 namespace {
@@ -56,6 +57,32 @@ TEST(PhotonsFor, APlainUnderTheSkyNeedsTheLeastAndARoomBehindASlitMore) {
   const int64_t for_plain = plain.Needed({}), for_room = room.Needed({});
   EXPECT_LE(for_plain, 40000);
   EXPECT_GE(for_room, 2 * for_plain);
+}
+
+// What such a pilot leaves is what photons and density, done as tasks of their own, would come to.
+TEST(PhotonsFor, APilotOfAsManyAsAreNeededIsTheBakes) {
+  BakeSettings settings;
+  settings.seed = kSeed;
+  settings.quality = Quality::kPreview;
+  SilentProgress progress;
+  const auto choose = [&](const PhotonScene& scene) { return PhotonsFor(scene, settings, progress); };
+  const Prepared plain(PlaneLevel(160)), room(RoomBehindASlit());
+  EXPECT_FALSE(room.With(choose).flown.has_value());
+  const PhotonChoice choice = plain.With(choose);
+  ASSERT_TRUE(choice.flown.has_value());
+  plain.With([&](const PhotonScene& scene) {
+    const auto stage = BuildPhotonStage(scene, choice.photons, kSeed);
+    PhotonMap map;
+    map.flux.resize(2 * stage->cells.cells().size());
+    EmitPhotons(scene.world, scene.lights, stage->guide, stage->cells, stage->plan, 0, stage->plan.photons, progress,
+                map);
+    const RadianceCache cache =
+        EstimateDensity(scene.world, stage->cells, map, stage->plan, DensityOf(settings), progress);
+    EXPECT_EQ(SerializeCache(choice.flown->cache), SerializeCache(cache));
+    EXPECT_EQ(choice.flown->rays, map.totals.rays);
+    EXPECT_EQ(choice.flown->cache.rays, cache.rays);
+    return 0;
+  });
 }
 
 TEST(PhotonsFor, ASmallerErrorNeedsMoreAndANumberOfOnesOwnIsKept) {
