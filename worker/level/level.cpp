@@ -39,9 +39,9 @@ int WorstSamples(float target_error) {
 // clean. Rooms at a tenth of the mean were mottled at medium with the preview's quarter.
 float FloorShare(float target_error) { return std::clamp(3 * target_error, 0.1f, 0.25f); }
 
-// What tiles aim at, over what is asked for: samples that double and neighbours in other tiles leave less than a tile
+// What tiles may have, over what is asked for: samples that double and neighbours in other tiles leave less than a tile
 // may have.
-constexpr float kAim = 1.2f;
+constexpr float kTilesMay = 1.2f;
 
 constexpr int64_t kLeastPhotons = 32768;
 constexpr int64_t kMostPhotons = 4'000'000'000;  // their cells and the cache fit into 4 GB
@@ -61,7 +61,7 @@ Budget BudgetOf(const BakeSettings& settings, int64_t texels) {
   budget.gather.max_samples = settings.max_samples > 0 ? settings.max_samples : kMostSamples;
   budget.gather.mean_samples = std::min(limits.mean_samples, budget.gather.max_samples);
   budget.gather.min_samples = std::min(budget.gather.min_samples, budget.gather.max_samples);
-  budget.gather.target_error = settings.target_error > 0 ? kAim * settings.target_error : numbers.target_error;
+  budget.gather.target_error = settings.target_error > 0 ? kTilesMay * settings.target_error : numbers.target_error;
   budget.gather.worst_samples = WorstSamples(budget.gather.target_error);
   budget.gather.floor_share = FloorShare(budget.gather.target_error);
   budget.gather.seed = settings.seed;
