@@ -191,11 +191,16 @@ absl::Status CheckSurvey(const level_task::Survey& survey) {
 }
 
 absl::StatusOr<level_task::Survey> SurveyFrom(const TaskOutputs& done, const BlobReader& read) {
-  const auto output = std::find_if(done.begin(), done.end(), [](const auto& made) { return made.name == "survey"; });
-  if (output == done.end()) return absl::InternalError("the texel survey has no result");
-  BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, read(output->digest));
+  const auto made = [&](const char* name) {
+    return std::find_if(done.begin(), done.end(), [&](const TaskOutput& output) { return output.name == name; });
+  };
+  if (made("survey") == done.end()) return absl::InternalError("the texel survey has no result");
+  BAKEWELL_ASSIGN_OR_RETURN(const std::string bytes, read(made("survey")->digest));
   BAKEWELL_ASSIGN_OR_RETURN(level_task::Survey survey, level_task::ParseSurvey(bytes));
   BAKEWELL_RETURN_IF_ERROR(CheckSurvey(survey));
+  if (survey.has_cache && (made("cache") == done.end() || made("totals") == done.end())) {
+    return absl::InternalError("the texel survey did not hand in its radiance cache");
+  }
   return survey;
 }
 

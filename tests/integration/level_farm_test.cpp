@@ -171,6 +171,7 @@ TEST(LevelPlanner, ASurveyThatHasTheCacheLeavesNoPhotonsToFly) {
     const auto first = planner.Plan(request, read);
     ASSERT_TRUE(first.ok()) << first.status();
     const TaskOutputs done = {{"cache", {}, 0}, {"survey", Sha256Of(bytes), std::ssize(bytes)}, {"totals", {}, 0}};
+    EXPECT_EQ(planner.Continue(request, {*first}, {done[1]}, read).ok(), !has_cache);
     const auto rest = planner.Continue(request, {*first}, done, read);
     ASSERT_TRUE(rest.ok()) << rest.status();
     int photon_tasks = 0, from_survey = 0;
