@@ -33,6 +33,9 @@ IntLanes Load(const int32_t* from) {
 void Store(Lanes lanes, float* to) { std::memcpy(to, &lanes, sizeof(lanes)); }
 using Row = std::array<float, kMostRow + kLanes>;
 
+// Between planes of weights: were they a power of two apart, all would meet in the same few lines of the cache.
+constexpr size_t kPlaneGap = 2 * kLanes;
+
 // Weights by distance, by WindowIndex.
 const std::array<float, kWindow>& NearnessTable() {
   static const std::array<float, kWindow> table = [] {
@@ -59,7 +62,7 @@ SimilarTexels::SimilarTexels(int width, int height)
       height_(height),
       stride_(static_cast<size_t>(width) + 2 * kHalo),
       row_((static_cast<size_t>(width) + kLanes - 1) / kLanes * kLanes),
-      plane_(row_ * static_cast<size_t>(height)),
+      plane_(row_ * static_cast<size_t>(height) + kPlaneGap),
       weights_(kWindow * plane_),
       means_(plane_) {
   BAKEWELL_CHECK(stride_ <= kMostRow);
