@@ -12,7 +12,7 @@
 namespace bakewell {
 namespace {
 
-constexpr int kSide = 48;
+constexpr int kSide = 80;  // more than the bits of a word
 
 TEST(Connections, RoomsAreApart) {
   // Two rooms, one on each side of a wall at x = 24.
@@ -118,6 +118,8 @@ TEST(Connections, WhatIsCutOffIsWhatASearchDoesNotFind) {
   // A comb.
   const auto comb = [](int x, int y, int nx, int ny) { return x / 2 == nx / 2 || std::max(y, ny) < 2; };
   EXPECT_GT(CheckCutOff(comb), 1000);
+  // So few connections that every direction matters.
+  EXPECT_GT(CheckCutOff([&](int, int, int, int) { return random.Unit() < 0.35f; }), 1000);
 }
 
 TEST(Connections, WhatIsConnectedToNothingHasNoPart) {
