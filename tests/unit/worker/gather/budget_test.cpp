@@ -79,7 +79,7 @@ TEST(TileBudget, FewBrightTexelsDoNotTakeTheErrorThatDimOnesLeave) {
   // Each is off by less than a texel of its light may be, 2 x 0.05 sqrt(3 x 150), but all together by more than the
   // tile.
   const int shade = GoOn(light, options, deviation);
-  EXPECT_GT(shade, 40);  // 32 by what is to spare
+  EXPECT_GT(shade, 40);
   EXPECT_LE(shade, kShadeRows * kTileSide);
   options.worst_samples = 8;  // so that only the tile's sum can ask for more
   EXPECT_EQ(GoOn(light, options, deviation), shade);
