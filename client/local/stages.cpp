@@ -5,6 +5,7 @@
 #include <atomic>
 #include <mutex>
 
+#include "worker/gather/brightness.h"
 #include "worker/trace/float_mode.h"
 
 namespace bakewell {
@@ -61,7 +62,8 @@ absl::StatusOr<BakedTexels> BakeTexels(const PreparedLevel& prepared, const Bake
   BAKEWELL_ASSIGN_OR_RETURN(const Photons photons, TracePhotons(prepared, settings, baked, clock, progress));
   clock.Begin("gather");
   const LightTree tree(*prepared.lights);
-  const GatherScene scene{*prepared.world, *prepared.lights, tree, photons.cells, photons.cache};
+  const BrightnessPyramid brightness(photons.cells, photons.cache);
+  const GatherScene scene{*prepared.world, *prepared.lights, tree, photons.cells, photons.cache, &brightness};
   budget.gather.mean_irradiance = MeanIrradiance(prepared.texels, photons.cells, photons.cache);
   budget.gather.photon_flux = MeanPhotonFlux(photons.cells, photons.cache);
   baked.lights.resize(prepared.texels.texels.size());

@@ -74,22 +74,29 @@ GatherGuide::Sample GatherGuide::Draw(Vec2f u) const {
   return {{row.place, column.place}, row.density * column.density};
 }
 
-void FoundLight::Add(Vec3f place, bool at_infinity, float luminance) {
-  if (luminance > 0) rays_.push_back({place, at_infinity, luminance});
+float GatherGuide::Density(Vec3f local) const {
+  const size_t cell = CellOf(local), row = cell / kColumns, column = cell % kColumns;
+  const float in_rows = row_cdf_[row] - (row == 0 ? 0 : row_cdf_[row - 1]);
+  const float in_row = cell_cdf_[cell] - (column == 0 ? 0 : cell_cdf_[cell - 1]);
+  return in_rows * in_row * static_cast<float>(kCells);
+}
+
+void FoundLight::Add(Vec3f place, bool at_infinity, float luminance, float density) {
+  if (luminance > 0) rays_.push_back({place, at_infinity, luminance, density});
 }
 
 void FoundLight::Resample(double rays, float u) {
   double sum = 0, square = 0;
   for (const Ray& ray : rays_) {
     sum += static_cast<double>(ray.luminance);
-    square += static_cast<double>(ray.luminance) * static_cast<double>(ray.luminance);
+    square += ray.Square();
   }
   if (!(square > 0)) return;
   mean_share_ = sum * sum / (rays * square);
   const double step = square / static_cast<double>(kKept);
   double passed = 0, next = step * static_cast<double>(u);
   for (const Ray& ray : rays_) {
-    passed += static_cast<double>(ray.luminance) * static_cast<double>(ray.luminance);
+    passed += ray.Square();
     for (; next < passed && x_.size() < kKept; next += step) {
       x_.push_back(ray.place.x);
       y_.push_back(ray.place.y);

@@ -26,6 +26,8 @@ class GatherGuide {
   };
   // Maps uniform u to the density, cell by cell in order, so that well spread points stay well spread.
   Sample Draw(Vec2f u) const;
+  // The density in the cell of a unit direction about +z.
+  float Density(Vec3f local) const;
 
  private:
   std::array<float, kRows> row_cdf_;
@@ -35,9 +37,9 @@ class GatherGuide {
 // Light that the first rays of a tile's texels found, to guide the others by.
 class FoundLight {
  public:
-  // A ray whose primary sample was uniform brought `luminance` (of its share of the irradiance [W m^-2]) from the point
-  // `place`, or from the direction `place` at infinity.
-  void Add(Vec3f place, bool at_infinity, float luminance);
+  // A ray whose primary sample had this density brought `luminance` (of its share of the irradiance [W m^-2], over the
+  // density) from the point `place`, or from the direction `place` at infinity.
+  void Add(Vec3f place, bool at_infinity, float luminance, float density);
 
   // Keeps some of the rays, each as often as the square of its light says. `rays`: how many there were with those that
   // brought nothing; `u` in [0, 1) decides which are kept.
@@ -52,7 +54,10 @@ class FoundLight {
   struct Ray {
     Vec3f place;
     bool at_infinity;
-    float luminance;
+    float luminance, density;
+    double Square() const {
+      return static_cast<double>(luminance) * static_cast<double>(luminance) * static_cast<double>(density);
+    }
   };
   std::vector<Ray> rays_;
   // Of those that are kept, one after the other: directions from p are (x, y, z) - near p.

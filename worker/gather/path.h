@@ -7,6 +7,7 @@
 
 namespace bakewell {
 
+class BrightnessPyramid;
 class TileLights;
 
 // What the gather reads; all of it immutable.
@@ -16,6 +17,7 @@ struct GatherScene {
   const LightTree& tree;
   const SurfaceCells& cells;
   const RadianceCache& cache;
+  const BrightnessPyramid* brightness = nullptr;  // of the cache; none: no gather ray is aimed
 };
 
 // What the cache knows at a point of the scene's surface.

@@ -10,6 +10,7 @@
 #include "worker/filter/smooth_tile.h"
 #include "worker/gather/budget.h"
 #include "worker/gather/skip.h"
+#include "worker/gather/spots.h"
 #include "worker/gather/work.h"
 #include "worker/sample/sobol.h"
 #include "worker/sample/warp.h"
@@ -59,7 +60,23 @@ class TileGatherer {
     }
     if (lit_ ? Skips(Skip::kDarkCharts) : Skips(Skip::kNoLight)) LeaveOutDark();
     for (size_t i = 0; i < work_.size(); ++i) {
-      if (work_[i].has_direct) ChooseLights(map_.texels[begin_ + i], work_[i].sampler.radius(), work_[i]);
+      const Texel& texel = map_.texels[begin_ + i];
+      work_[i].expected = ExpectedIrradiance(scene_.cells, scene_.cache, map_, texel);
+      if (work_[i].has_direct) ChooseLights(texel, work_[i].sampler.radius(), work_[i]);
+    }
+    if (scene_.brightness) ChooseSpots();
+  }
+
+  void ChooseSpots() {
+    float expected = 0;
+    bool any = false;
+    for (const Work& work : work_) expected += work.expected / static_cast<float>(work_.size());
+    for (const Work& work : work_) any = any || work.has_indirect;
+    if (!any) return;
+    spots_.emplace(scene_, *scene_.brightness, map_, std::span(map_.texels).subspan(begin_, end_ - begin_), expected,
+                   TexelKey(map_.texels[begin_], options_.seed ^ 0x5907u), counters_);
+    for (size_t i = 0; i < work_.size() && !spots_->empty(); ++i) {
+      if (work_[i].has_indirect) work_[i].spots = spots_->ForTexel(map_.texels[begin_ + i]);
     }
   }
 
@@ -74,7 +91,6 @@ class TileGatherer {
     }
     work.choice = lights_->ForTexel(texel, radius);
     work.has_direct = !work.choice.empty || scene_.lights.samples_distant();
-    work.expected = ExpectedIrradiance(scene_.cells, scene_.cache, map_, texel);
   }
 
   bool Skips(Skip skip) const { return !options_.no_skip.Has(skip); }
@@ -226,9 +242,36 @@ class TileGatherer {
     uint32_t sample, key;
     SurfacePoint from;
     Vec3f dir;
-    float cosine, density;  // density: of the guide
+    float cosine, density;  // as Drawn
     Hit hit;
   };
+
+  // The direction of a gather ray, and what its density is beside GatherPdf. A spot may lie behind the surface: cosine
+  // <= 0, and nothing comes from there.
+  struct Drawn {
+    Vec3f dir;
+    float cosine = 0, density = 1;
+  };
+  Drawn Draw(const Work& work, const TexelPoint& point, Vec2f u) const {
+    const float share = work.spots.share;
+    Drawn drawn;
+    if (u.x < share) {
+      drawn.dir = NormalizeOrZero(spots_->Draw(work.spots, {u.x / share, u.y}) - point.surface.position);
+      const Vec3f local = point.frame.ToLocal(drawn.dir);
+      drawn.cosine = local.z;
+      if (work.guide) drawn.density = work.guide->Density(local);
+    } else {
+      if (share > 0) u.x = std::min((u.x - share) / (1 - share), 0x1.fffffep-1f);
+      const GatherGuide::Sample guided = work.guide ? work.guide->Draw(u) : GatherGuide::Sample{u, 1};
+      const Vec3f local = GatherHemisphere(guided.primary);
+      drawn = {point.frame.ToWorld(local), local.z, guided.density};
+    }
+    if (share > 0 && drawn.cosine > 0) {
+      const float aimed = spots_->Density(work.spots, point.surface.position, drawn.dir);
+      drawn.density = (1 - share) * drawn.density + share * aimed / GatherPdf(drawn.cosine);
+    }
+    return drawn;
+  }
 
   // Rays are traced some ahead of what is done with their hits, which are seldom in the processor's caches.
   void GatherIndirect(Work& work, uint32_t begin, uint32_t end) {
@@ -247,20 +290,24 @@ class TileGatherer {
     const SobolPoint u = set.At(sample);
     const TexelPoint point = work.sampler.At(u.Get2(2));
     if (!point.valid) return false;
-    const GatherGuide::Sample drawn = work.guide ? work.guide->Draw(u.Get2(0)) : GatherGuide::Sample{u.Get2(0), 1};
-    const Vec3f local = GatherHemisphere(drawn.primary), dir = point.frame.ToWorld(local);
     const uint32_t key = HashCombine(work.key, 0x80000000u | sample);
-    ray = {sample, key, point.surface, dir, local.z, drawn.density, {}};
-    ray.hit = scene_.world.Intersect(RayFrom(point.surface, dir, kInfinity, key));
+    const Drawn drawn = Draw(work, point, u.Get2(0));
+    ray = {sample, key, point.surface, drawn.dir, drawn.cosine, drawn.density, {}};
+    if (drawn.cosine <= 0) return true;
+    ray.hit = scene_.world.Intersect(RayFrom(point.surface, drawn.dir, kInfinity, key));
     if (ray.hit) __builtin_prefetch(&CacheAt(scene_, scene_.world.PointAt(ray.hit), ray.hit.back));
     return true;
   }
 
   void AddFound(Work& work, const GatherRay& ray, uint32_t planned) {
     work.indirect.Count();
+    if (ray.cosine <= 0) {
+      work.indirect.AddIrradiance(ray.sample, planned, {});
+      return;
+    }
     ++counters_.gather_rays;
     if (MeetsBack(scene_.world, ray.hit)) {
-      work.backs += 1;
+      work.backs += 1 / ray.density;
       work.nearest_back = std::min(work.nearest_back, ray.hit.t);
     }
     escaped_ += ray.hit ? 0 : 1;
@@ -278,7 +325,8 @@ class TileGatherer {
     const float weight = ray.cosine / (pdf * ray.density);
     for (size_t g = 0; g < kVarianceGroups; ++g) work.group[g] += reflected.group[g] * weight;
     if (collects_) {
-      found_.Add(ray.hit ? scene_.world.PointAt(ray.hit).position : ray.dir, !ray.hit, Luminance(irradiance));
+      found_.Add(ray.hit ? scene_.world.PointAt(ray.hit).position : ray.dir, !ray.hit, Luminance(irradiance),
+                 ray.density);
     }
     work.indirect.AddIrradiance(ray.sample, planned, irradiance);
     work.indirect.AddSh(ray.dir, radiance / pdf);
@@ -301,6 +349,7 @@ class TileGatherer {
   const GatherOptions& options_;
   GatherCounters& counters_;
   std::optional<TileLights> lights_;
+  std::optional<TileSpots> spots_;
   FoundLight found_;
   bool collects_ = true;
   const bool lit_ = !scene_.tree.empty() || scene_.lights.environment().bright() || scene_.lights.samples_distant();

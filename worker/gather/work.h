@@ -9,6 +9,7 @@
 #include "worker/gather/accumulate.h"
 #include "worker/gather/direct.h"
 #include "worker/gather/guide.h"
+#include "worker/gather/spots.h"
 #include "worker/gather/tile.h"
 #include "worker/texel/validity.h"
 
@@ -33,6 +34,7 @@ struct TexelWork {
   bool direct_active = false, indirect_active = false;  // in the next round
   Accumulator direct{}, indirect{};
   std::optional<GatherGuide> guide{};          // of gather rays, once there are kGuidedFrom
+  TileSpots::Choice spots{};                   // that its gather rays are aimed at
   bool guided = false;                         // a guide was looked for
   std::array<float, kVarianceGroups> group{};  // sums of photon-borne irradiance
   int direct_samples = 0, indirect_samples = 0;

@@ -256,11 +256,14 @@ absl::StatusOr<MadeOutputs> LevelExecutor::Gather(const Work& work) {
     if (made->cache.light.size() != 2 * stage->cells.cells().size()) {
       return absl::InvalidArgumentError("the radiance cache is of other cells");
     }
+    made->stage = stage;
+    made->brightness.emplace(stage->cells, made->cache);
     made->mean_irradiance = MeanIrradiance(*level->texels, stage->cells, made->cache);
     made->photon_flux = MeanPhotonFlux(stage->cells, made->cache);
     return made;
   }));
-  const GatherScene scene{*level->world, *level->lights, *level->tree, stage->cells, photons->cache};
+  const GatherScene scene{*level->world, *level->lights, *level->tree,
+                          stage->cells,  photons->cache, &*photons->brightness};
   GatherOptions options = BudgetOf(work.settings, level->texels->texel_count()).gather;
   options.mean_irradiance = photons->mean_irradiance;
   options.photon_flux = photons->photon_flux;

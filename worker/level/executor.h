@@ -8,6 +8,7 @@
 
 #include "core/artifact/level_task.h"
 #include "core/artifact/progress.h"
+#include "worker/gather/brightness.h"
 #include "worker/level/photons.h"
 #include "worker/task/executor.h"
 
@@ -41,7 +42,9 @@ class LevelExecutor final : public TaskExecutor {
   };
   // The radiance cache with what follows from it.
   struct Photons {
+    std::shared_ptr<const PhotonStage> stage;
     RadianceCache cache;
+    std::optional<BrightnessPyramid> brightness;
     float mean_irradiance = 0, photon_flux = 0;
   };
   absl::StatusOr<std::shared_ptr<const Level>> LevelOf(const Work& work, Progress* listener = nullptr);

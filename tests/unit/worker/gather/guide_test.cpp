@@ -41,6 +41,7 @@ TEST(GatherGuide, DensityIsThatOfItsSamples) {
     const size_t row = static_cast<size_t>(sample.primary.x * GatherGuide::kRows);
     const size_t cell = row * GatherGuide::kColumns + static_cast<size_t>(sample.primary.y * GatherGuide::kColumns);
     ASSERT_LT(cell, weight.size());
+    EXPECT_NEAR(guide.Density(GatherHemisphere(sample.primary)), sample.density, 1e-5f * sample.density);
     EXPECT_NEAR(static_cast<double>(sample.density), static_cast<double>(weight[cell]) * GatherGuide::kCells / sum,
                 1e-3);
     count[cell] += 1.0 / kSamples;
@@ -68,7 +69,7 @@ FoundLight LookAround(Vec3f place, float sky, int rays) {
   for (int i = 0; i < rays; ++i) {
     const Vec3f dir = GatherHemisphere({random.Unit(), random.Unit()});
     const bool bright = Dot(dir, NormalizeOrZero(place)) > std::cos(0.2f);
-    found.Add(bright ? dir * Length(place) : dir, !bright, bright ? 50.0f : sky);
+    found.Add(bright ? dir * Length(place) : dir, !bright, bright ? 50.0f : sky, 1);
   }
   found.Resample(rays, 0.5f);
   return found;
@@ -100,6 +101,37 @@ TEST(FoundLight, GuidesRaysToIt) {
   }
 }
 
+// Rays that were aimed at the light count by their density: the guide is that of rays that were not.
+TEST(FoundLight, LearnsTheSameFromRaysThatWereAimed) {
+  const Vec3f place{1, 2, 2};
+  constexpr int kRays = 40000;
+  constexpr float kAimed = 0.4f;
+  // Aimed rays go to the disc alone, uniform by the primary square.
+  TestRandom random(9);
+  const auto meets = [&](Vec3f dir) { return Dot(dir, NormalizeOrZero(place)) > std::cos(0.2f); };
+  int inside = 0;
+  for (int i = 0; i < kRays; ++i) inside += meets(GatherHemisphere({random.Unit(), random.Unit()})) ? 1 : 0;
+  const float density_inside = 1 - kAimed + kAimed * kRays / static_cast<float>(inside);
+  FoundLight found;
+  for (int i = 0; i < kRays; ++i) {
+    const bool aimed = random.Unit() < kAimed;
+    Vec3f dir;
+    do dir = GatherHemisphere({random.Unit(), random.Unit()});
+    while (aimed && !meets(dir));
+    const bool bright = meets(dir);
+    const float density = bright ? density_inside : 1 - kAimed;
+    found.Add(bright ? dir * Length(place) : dir, !bright, (bright ? 50.0f : 1.0f) / density, density);
+  }
+  found.Resample(kRays, 0.5f);
+  const auto aimed = found.GuideAt({}, kUp), unaimed = LookAround(place, 1, kRays).GuideAt({}, kUp);
+  ASSERT_TRUE(aimed && unaimed);
+  for (int i = 0; i < 64; ++i) {
+    const Vec3f dir =
+        GatherHemisphere({(static_cast<float>(i / 8) + 0.5f) / 8, (static_cast<float>(i % 8) + 0.5f) / 8});
+    EXPECT_NEAR(aimed->Density(dir) / unaimed->Density(dir), 1, 0.25f) << i;
+  }
+}
+
 TEST(FoundLight, GuidesNobodyWhereAllDirectionsAreAlike) {
   EXPECT_FALSE(LookAround({0, 0, 1}, 50, 4000).GuideAt({}, kUp).has_value());
   FoundLight nothing;
@@ -110,7 +142,7 @@ TEST(FoundLight, GuidesNobodyWhereAllDirectionsAreAlike) {
 // Light so far away that the distance is beyond what floats hold: its direction is no number, and no cell.
 TEST(FoundLight, DirectionsThatAreNoNumbersStayInTheTable) {
   FoundLight found;
-  for (int i = 0; i < 64; ++i) found.Add({3e38f, 3e38f, 3e38f}, false, 1);
+  for (int i = 0; i < 64; ++i) found.Add({3e38f, 3e38f, 3e38f}, false, 1, 1);
   found.Resample(64, 0.5f);
   const float s = 1 / std::sqrt(3.0f), r = 1 / std::sqrt(2.0f);
   const Frame diagonal{{r, -r, 0}, {s * r, s * r, -2 * s * r}, {s, s, s}};
