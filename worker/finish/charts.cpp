@@ -21,7 +21,7 @@ std::vector<ChartSummary> SummarizeCharts(const TexelMap& map, std::span<const T
     chart.invalid += lights[i].valid ? 0 : 1;
     if (!lights[i].valid) continue;
     chart.irradiance += static_cast<double>(Luminance(lights[i].irradiance));
-    chart.standard_error += LuminanceVariance(lights[i].variance);
+    chart.standard_error += static_cast<double>(LuminanceVariance(lights[i].variance));
   }
   std::vector<ChartSummary> result;
   for (auto& [number, chart] : charts) {

@@ -148,7 +148,7 @@ class PageFilter {
         if (part == 0) continue;
         const TexelLight& light = LightAt(block.left + x, block.top + y);
         PartLight& filtered = work.At(x, y) = PartOf(light);
-        const float variance = Luminance(filtered.variance);
+        const float variance = LuminanceVariance(filtered.variance);
         noisy |= variance > 0;
         weights.Put(x, y, ValueOf(light), variance, part);
       }
@@ -250,7 +250,7 @@ class PageFilter {
       void Add(double value, const Smoothed& one) {
         before += value;
         after += static_cast<double>(Luminance(one.light.irradiance));
-        variance += static_cast<double>(Luminance(one.light.variance));
+        variance += static_cast<double>(LuminanceVariance(one.light.variance));
         bias_square += one.bias_square;
         photons_before += static_cast<double>(one.photons_before);
         photons_after += static_cast<double>(one.photons_after);
@@ -293,14 +293,14 @@ class PageFilter {
   // noise.
   bool Join(std::span<const Seam> seams, LightPart& result, double& bias_square) const {
     const TexelLight& light = lights_[seams.front().texel];
-    const float own_value = ValueOf(light), own_variance = Luminance(VarianceOf(light));
+    const float own_value = ValueOf(light), own_variance = LuminanceVariance(VarianceOf(light));
     const PartLight own = PartOf(light);
     std::array<float, kWide> sum = own.numbers;
     Rgb variance = own.variance;
     float total = 1, moved = 0;
     for (const Seam& seam : seams) {
       const TexelLight& other = lights_[seam.other];
-      const float by = ValueOf(other) - own_value, its_variance = Luminance(VarianceOf(other));
+      const float by = ValueOf(other) - own_value, its_variance = LuminanceVariance(VarianceOf(other));
       if (!(own_variance > 0) || !(its_variance > 0)) continue;
       const float weight = Likeness(kOfOne * by * by / (own_variance + its_variance)) *
                            Nearness(seam.distance * seam.distance) *
@@ -315,7 +315,7 @@ class PageFilter {
     for (float& number : sum) number /= total;
     result = LightOf(sum, variance / (total * total));
     moved /= total;
-    const float noise = own_variance * (1 - 2 / total) + Luminance(result.variance);
+    const float noise = own_variance * (1 - 2 / total) + LuminanceVariance(result.variance);
     bias_square = static_cast<double>(moved * moved - noise / kMargin);
     return true;
   }

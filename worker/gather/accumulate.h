@@ -69,6 +69,18 @@ class Accumulator {
     for (size_t b = 0; b < blocks; ++b) sum += (Block(b) - mean) * (Block(b) - mean);
     return ToFloat(sum * (n / (count_ * count_ * (n - 1))));
   }
+  // Likewise of its luminance, whose channels need not err together.
+  float LuminanceVariance() const {
+    if (count_ <= 0) return 0;
+    const size_t blocks = this->blocks();
+    const auto luminance = [](Vec3d rgb) { return static_cast<double>(Luminance(ToFloat(rgb))); };
+    if (blocks < 2) return static_cast<float>(luminance(Mean()) * luminance(Mean()));
+    const auto n = static_cast<double>(blocks);
+    const Vec3d mean = Mean() * (count_ / n);
+    double sum = 0;
+    for (size_t b = 0; b < blocks; ++b) sum += luminance(Block(b) - mean) * luminance(Block(b) - mean);
+    return static_cast<float>(sum * (n / (count_ * count_ * (n - 1))));
+  }
   // Mean squares of half the difference between the two halves (luminance): of the whole, of a half, of a quarter. Each
   // is what doubling the samples to that size took off the variance (1 : 2 : 4 for independent samples).
   std::array<double, 3> Halvings() const {

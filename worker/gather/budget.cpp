@@ -28,9 +28,9 @@ std::vector<float> Sum(std::vector<float> a, const std::vector<float>& b) {
 
 }  // namespace
 
-void TileBudget::Part::Add(Rgb irradiance, Rgb its_variance, int its_samples) {
+void TileBudget::Part::Add(Rgb irradiance, float its_variance, int its_samples) {
   value.push_back(Luminance(irradiance));
-  variance.push_back(Luminance(its_variance));
+  variance.push_back(its_variance);
   samples.push_back(its_samples);
 }
 
@@ -78,8 +78,9 @@ void TileBudget::Decide(std::vector<TexelWork>& all) {
   CorrectVariances(all);
   Part direct, indirect;
   for (const TexelWork& work : all) {
-    direct.Add(work.direct.Irradiance(), work.DirectVariance(), work.direct_samples);
-    indirect.Add(work.indirect.Irradiance(), work.IndirectVariance(), work.indirect_samples);
+    direct.Add(work.direct.Irradiance(), work.direct.LuminanceVariance() * work.direct_correction, work.direct_samples);
+    indirect.Add(work.indirect.Irradiance(), work.indirect.LuminanceVariance() * work.indirect_correction,
+                 work.indirect_samples);
     direct_.changed += work.direct_active ? 1 : 0;
     indirect_.changed += work.indirect_active ? 1 : 0;
   }

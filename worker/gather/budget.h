@@ -33,7 +33,7 @@ class TileBudget {
   struct Part {
     std::vector<float> value, variance, pooled;  // pooled: variance over the neighbourhood, later after filtering
     std::vector<int> samples;
-    void Add(Rgb irradiance, Rgb its_variance, int its_samples);
+    void Add(Rgb irradiance, float its_variance, int its_samples);
   };
   // What the filter will make of a part, when it was last looked at as a whole.
   struct Filtered {

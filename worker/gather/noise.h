@@ -23,7 +23,7 @@ class SetNoise {
     const double weight = 1 / (static_cast<double>(unit) * static_cast<double>(unit));
     const std::array<double, 3> halvings = set.Halvings();
     for (size_t k = 0; k < halving_.size(); ++k) halving_[k] += halvings[k] * weight;
-    variance_ += static_cast<double>(Luminance(set.Variance())) * weight;
+    variance_ += static_cast<double>(set.LuminanceVariance()) * weight;
     ++sets_;
   }
   size_t sets() const { return sets_; }

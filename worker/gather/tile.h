@@ -51,10 +51,8 @@ struct TexelLight {
 };
 
 // Variance of the luminance whose channels have these variances and err together, as those of one estimate do.
-inline double LuminanceVariance(Rgb variance) {
-  const double deviation = 0.2126 * std::sqrt(static_cast<double>(variance.x)) +
-                           0.7152 * std::sqrt(static_cast<double>(variance.y)) +
-                           0.0722 * std::sqrt(static_cast<double>(variance.z));
+inline float LuminanceVariance(Rgb variance) {
+  const float deviation = Luminance(Rgb{std::sqrt(variance.x), std::sqrt(variance.y), std::sqrt(variance.z)});
   return deviation * deviation;
 }
 

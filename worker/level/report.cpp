@@ -73,7 +73,7 @@ void BakeTally::Count(std::span<const TexelLight> lights, const FilterCounters& 
     direct_samples_ += light.direct_samples;
     indirect_samples_ += light.indirect_samples;
     if (!light.valid) continue;
-    variance_ += LuminanceVariance(light.variance);
+    variance_ += static_cast<double>(LuminanceVariance(light.variance));
     irradiance_ += static_cast<double>(Luminance(light.irradiance));
     ++valid_;
   }

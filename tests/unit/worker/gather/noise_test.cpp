@@ -14,7 +14,8 @@ namespace {
 using Sampled = std::function<double(Vec2f)>;
 
 // True variance of the mean of `samples` points, over what the corrected estimate says: sets of one tile, keyed apart.
-double TrueOverEstimated(const Sampled& sampled, double mean, uint32_t samples, bool sobol) {
+// Of light of a colour, its red.
+double TrueOverEstimated(const Sampled& sampled, double mean, uint32_t samples, bool sobol, Rgb colour = {1, 1, 1}) {
   constexpr int kSets = 1024;
   TestRandom random(7);
   SetNoise noise;
@@ -26,7 +27,7 @@ double TrueOverEstimated(const Sampled& sampled, double mean, uint32_t samples, 
       sum.Count();
       const Vec2f u = sobol ? set.At(i).Get2(0) : Vec2f{random.Unit(), random.Unit()};
       const float value = static_cast<float>(sampled(u));
-      sum.AddIrradiance(i, samples, {value, value, value});
+      sum.AddIrradiance(i, samples, colour * value);
     }
     noise.Add(sum, 1);
     square += std::pow(static_cast<double>(sum.Irradiance().x) - mean, 2) / kSets;
@@ -46,6 +47,14 @@ TEST(SetNoise, IsAboutRightForSobolSetsOverAnEdge) {
     const double ratio = TrueOverEstimated(Disc, kDisc, samples, true);
     EXPECT_GT(ratio, 0.6) << samples;
     EXPECT_LT(ratio, 1.35) << samples;
+  }
+}
+
+// A correction by luminance must not take a red lamp's errors for a white one's.
+TEST(SetNoise, IsTheSameForColouredLight) {
+  const double white = TrueOverEstimated(Disc, kDisc, 64, true);
+  for (const Rgb colour : {Rgb{1, 0, 0}, Rgb{1, 0, 0.3f}, Rgb{1, 0.2f, 3}}) {
+    EXPECT_NEAR(TrueOverEstimated(Disc, kDisc, 64, true, colour), white, 1e-4);
   }
 }
 
