@@ -358,6 +358,56 @@ def terrain(rng):
     return level
 
 
+def sconces(rng):
+    """Bare lamps two centimetres from walls, and a candle on a table."""
+    level = Level(rng, (0.3, 0.8))
+    level.room([8, 3, 6])
+    for _ in range(6):
+        x, side = rng.uniform(-3.5, 3.5), rng.choice([-1, 1])
+        level.light("point", [x, 1.8, side * 2.98], color=[1.0, 0.7, 0.4], intensity=0.8)
+        level.box("m2", [x, 1.6, side * 2.95], [0.2, 0.02, 0.1])
+    level.box("m1", [0, 0.72, 0], [1.5, 0.05, 0.8])
+    level.light("point", [0, 0.765, 0], color=[1.0, 0.8, 0.5], intensity=1.0)
+    for _ in range(6):
+        level.box(level.some(), [rng.uniform(-3, 3), 0.35, rng.uniform(-2, 2)], rng.uniform(0.3, 0.7, 3))
+    return level
+
+
+def neon(rng):
+    """Pure red and pure blue light on two sides of a partition."""
+    level = Level(rng, (0.05, 0.5))
+    level.room([8, 3, 8])
+    level.material("blue", [0, 0, 0], [0, 0, 60])
+    level.material("red", [0, 0, 0], [50, 0, 0])
+    level.box("m1", [0, 1.5, -1.2], [0.1, 3, 5.6])
+    level.quad("blue", [-3, 2.98, -1], [1, 0, 0], [0, 0, 0.1])
+    level.quad("red", [2, 2.98, 1], [1, 0, 0], [0, 0, 0.1])
+    for _ in range(10):
+        level.box(level.some(), [rng.uniform(-3.5, 3.5), 0.45, rng.uniform(-3.5, 3.5)], rng.uniform(0.3, 0.9, 3))
+    return level
+
+
+def tower(rng):
+    """A shaft of 18 m with small windows and steps, under sun and sky."""
+    level = Level(rng, (0.3, 0.7), BLUE_SKY)
+    height = 18
+    for side in (-1, 1):
+        level.box("m1", [side * 2.6, height / 2, 0], [0.2, height, 5.4])
+    level.box("m2", [0, height / 2, -2.6], [5, height, 0.2])
+    for y in (-0.1, height + 0.1):
+        level.box("m0", [0, y, 0], [5.4, 0.2, 5.4])
+    windows = np.arange(2, height - 1, 3)
+    for low, high in zip([0, *(windows + 0.5)], [*windows, height]):
+        level.box("m2", [0, (low + high) / 2, 2.6], [5, high - low, 0.2])
+    for y in windows:
+        for side in (-1, 1):
+            level.box("m2", [side * 1.4, y + 0.25, 2.6], [2.2, 0.5, 0.2])
+    for k in range(30):
+        level.box("m3", [1.7 * math.cos(0.6 * k), 0.5 + 0.55 * k, 1.7 * math.sin(0.6 * k)], [1.2, 0.1, 1.2])
+    level.light("directional", None, [rng.uniform(-0.4, 0.4), -0.7, -0.8], intensity=6.0, **SUN)
+    return level
+
+
 # Texels per metre, so that each has 10,000 to 30,000.
 KINDS = {clutter: 6, bright: 10, doorway: 9, cave: 6, night: 2.5, shelves: 8, rooms: 7, canopy: 7, spots: 5, tubes: 6, partitions: 8, shade: 7, cove: 8, gaps: 9,
-         terrain: 1.2}
+         terrain: 1.2, sconces: 8, neon: 8, tower: 5}
