@@ -28,7 +28,7 @@ inline constexpr KindName kChart{"chart/layout", 2};
 inline constexpr KindName kSurvey{"texel/survey", 17};
 inline constexpr KindName kEmit{"photon/emit", 12};
 inline constexpr KindName kDensity{"photon/density", 8};
-inline constexpr KindName kGather{"gather/tiles", 37};
+inline constexpr KindName kGather{"gather/tiles", 38};
 inline constexpr KindName kFinish{"finish/page", 22};
 inline constexpr KindName kReport{"finish/report", 5};
 inline constexpr KindName kAll[] = {kChart, kSurvey, kEmit, kDensity, kGather, kFinish, kReport};

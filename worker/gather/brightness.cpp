@@ -4,15 +4,39 @@
 #include <tuple>
 
 namespace bakewell {
+namespace {
 
-BrightnessPyramid::BrightnessPyramid(const SurfaceCells& cells, const RadianceCache& cache) : cells_(cells) {
-  sums_.reserve(cells.cells().size() / 3 * 4);
+constexpr float kBrightest = 1e15f;  // irradiance that is told from brighter ones [W m^-2]: all sums are finite
+
+}  // namespace
+
+BrightnessPyramid::BrightnessPyramid(const SurfaceCells& cells, const RadianceCache& cache, size_t most_patches)
+    : cells_(cells), first_(cells.patches().size(), kNone) {
+  struct Side {
+    float square;
+    uint32_t patch;
+    bool back;
+  };
+  std::vector<Side> sides;
   for (uint32_t patch = 0; patch < cells.patches().size(); ++patch) {
-    const int level = AddPatch(patch, cache);
+    const uint32_t begin = cells.patches()[patch].first_cell;
+    Sum sum;
+    for (size_t c = begin; c < begin + SizeAt(patch, 0).count(); ++c)
+      sum += SumOf(cells.cells()[c], &cache.light[2 * c]);
     for (const bool back : {false, true}) {
-      const Spot whole = SpotOf({patch, level, 0, 0, back});
-      if (whole.light.flux > 0) patches_.push_back(whole);
+      if (sum.side[back ? 1 : 0].square > 0) sides.push_back({sum.side[back ? 1 : 0].square, patch, back});
     }
+  }
+  if (sides.size() > most_patches) {
+    std::nth_element(sides.begin(), sides.begin() + static_cast<std::ptrdiff_t>(most_patches), sides.end(),
+                     [](const Side& a, const Side& b) {
+                       return std::tuple(-a.square, a.patch, a.back) < std::tuple(-b.square, b.patch, b.back);
+                     });
+    sides.resize(most_patches);
+  }
+  for (const Side& side : sides) {
+    if (first_[side.patch] == kNone) AddPatch(side.patch, cache);
+    patches_.push_back(SpotOf(Whole(side.patch, side.back)));
   }
   std::sort(patches_.begin(), patches_.end(), [](const Spot& a, const Spot& b) {
     return std::tuple(-a.light.Typical(), a.square) < std::tuple(-b.light.Typical(), b.square);
@@ -29,34 +53,42 @@ BrightnessPyramid::Sum& BrightnessPyramid::Sum::operator+=(const Sum& other) {
   return *this;
 }
 
-int BrightnessPyramid::AddPatch(uint32_t patch, const RadianceCache& cache) {
-  first_.push_back(sums_.size());
+BrightnessPyramid::Sum BrightnessPyramid::SumOf(const SurfaceCell& cell, const CachedLight* sides) const {
+  Sum sum;
+  for (size_t i = 0; i < sum.side.size(); ++i) {
+    const float irradiance = std::min(kBrightest, std::max(0.0f, Luminance(sides[i].irradiance)));
+    sum.side[i] = {irradiance * cell.area, irradiance * irradiance * cell.area};
+  }
+  sum.area = cell.area;
+  return sum;
+}
+
+void BrightnessPyramid::AddPatch(uint32_t patch, const RadianceCache& cache) {
+  first_[patch] = static_cast<uint32_t>(sums_.size());
   const CellPatch& grid = cells_.patches()[patch];
   const Vec3f normal = NormalizeOrZero(Cross(grid.t, grid.b));
   Size size = SizeAt(patch, 0);
   for (size_t c = grid.first_cell; c < grid.first_cell + size.count(); ++c) {
     const SurfaceCell& cell = cells_.cells()[c];
-    Sum& sum = sums_.emplace_back();
-    for (size_t i = 0; i < sum.side.size(); ++i) {
-      const auto irradiance = static_cast<double>(Luminance(cache.light[2 * c + i].irradiance));
-      sum.side[i] = {irradiance * static_cast<double>(cell.area),
-                     irradiance * irradiance * static_cast<double>(cell.area)};
-    }
-    sum.area = static_cast<double>(cell.area);
-    sum.depth = sum.area * static_cast<double>(Dot(cell.position - grid.origin, normal));
+    sums_.push_back(SumOf(cell, &cache.light[2 * c]));
+    sums_.back().depth = cell.area * Dot(cell.position - grid.origin, normal);
   }
-  int level = 0;
-  while (size.count() > 1) {
+  for (int level = 1; size.count() > 1; ++level) {
     const Size finer = size;
     const size_t begin = sums_.size(), below = begin - finer.count();
-    size = SizeAt(patch, ++level);
+    size = SizeAt(patch, level);
     sums_.resize(begin + size.count());
     for (size_t i = 0; i < finer.count(); ++i) {
       const size_t width = static_cast<size_t>(finer.width), x = i % width / 2, y = i / width / 2;
       sums_[begin + y * static_cast<size_t>(size.width) + x] += sums_[below + i];
     }
   }
-  return level;
+}
+
+BrightnessPyramid::Square BrightnessPyramid::Whole(uint32_t patch, bool back) const {
+  int level = 0;
+  while (SizeAt(patch, level).count() > 1) ++level;
+  return {patch, level, 0, 0, back};
 }
 
 BrightnessPyramid::Size BrightnessPyramid::SizeAt(uint32_t patch, int level) const {
@@ -82,7 +114,7 @@ BrightnessPyramid::Spot BrightnessPyramid::SpotOf(const Square& square) const {
   spot.place.u = x * (0.5f * static_cast<float>(end_x - begin_x));
   spot.place.v = y * (0.5f * static_cast<float>(end_y - begin_y));
   spot.place.center = grid.origin + x * static_cast<float>(begin_x) + spot.place.u + y * static_cast<float>(begin_y) +
-                      spot.place.v + normal * (sum.area > 0 ? static_cast<float>(sum.depth / sum.area) : 0.0f);
+                      spot.place.v + normal * (sum.area > 0 ? sum.depth / sum.area : 0.0f);
   spot.place.normal = square.back ? -normal : normal;
   spot.place.area = 4 * Length(Cross(spot.place.u, spot.place.v));
   return spot;
@@ -93,7 +125,7 @@ void BrightnessPyramid::Split(const Square& square, std::vector<Spot>& parts) co
   for (int y = 2 * square.y; y < std::min(2 * square.y + 2, size.height); ++y) {
     for (int x = 2 * square.x; x < std::min(2 * square.x + 2, size.width); ++x) {
       const Spot part = SpotOf({square.patch, square.level - 1, x, y, square.back});
-      if (part.light.flux > 0) parts.push_back(part);
+      if (part.light.square > 0) parts.push_back(part);
     }
   }
 }

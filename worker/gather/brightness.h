@@ -14,8 +14,10 @@ namespace bakewell {
 // whole patch: what is bright can be looked for from the coarse to the fine.
 class BrightnessPyramid {
  public:
-  // cells: outlives it.
-  BrightnessPyramid(const SurfaceCells& cells, const RadianceCache& cache);
+  static constexpr size_t kMostPatches = 16384;  // sides of patches
+
+  // cells: outlives it. Of those sides of patches whose squares of irradiance are the largest in sum.
+  BrightnessPyramid(const SurfaceCells& cells, const RadianceCache& cache, size_t most_patches = kMostPatches);
 
   // One side of a square of 2^level x 2^level cells of a patch; the last ones of a row or a column may be smaller.
   struct Square {
@@ -26,9 +28,9 @@ class BrightnessPyramid {
   };
   // Of a square, as if it were flat.
   struct Brightness {
-    double flux = 0;                                  // luminance of the irradiance times the area of the surface [W]
-    double square = 0;                                // of its square, likewise [W^2 m^-2]
-    double Typical() const { return square / flux; }  // irradiance where most of the light is [W m^-2]
+    float flux = 0;                                  // luminance of the irradiance times the area of the surface [W]
+    float square = 0;                                // of its square, likewise [W^2 m^-2]
+    float Typical() const { return square / flux; }  // irradiance where most of the light is [W m^-2]
   };
   struct Place {
     Vec3f center, u, v;  // u, v: from the centre to the middles of two edges [m]
@@ -41,7 +43,7 @@ class BrightnessPyramid {
     Place place;
   };
 
-  // Both sides of whole patches, as far as they have light; the largest Typical() first.
+  // Whole ones, as far as they have light; the largest Typical() first.
   const std::vector<Spot>& patches() const { return patches_; }
   // Appends those that one above level 0 consists of, and that have light.
   void Split(const Square& square, std::vector<Spot>& parts) const;
@@ -50,7 +52,7 @@ class BrightnessPyramid {
  private:
   struct Sum {
     std::array<Brightness, 2> side;  // front, back
-    double area = 0, depth = 0;      // of the surface [m^2]; its distance from the patch's plane, times that
+    float area = 0, depth = 0;       // of the surface [m^2]; its distance from the patch's plane, times that
     Sum& operator+=(const Sum& other);
   };
   struct Size {
@@ -59,12 +61,14 @@ class BrightnessPyramid {
   };
   Size SizeAt(uint32_t patch, int level) const;
   Spot SpotOf(const Square& square) const;
-  // Returns the level of the whole patch.
-  int AddPatch(uint32_t patch, const RadianceCache& cache);
+  Square Whole(uint32_t patch, bool back) const;
+  Sum SumOf(const SurfaceCell& cell, const CachedLight* sides) const;
+  void AddPatch(uint32_t patch, const RadianceCache& cache);
 
+  static constexpr uint32_t kNone = ~0u;
   const SurfaceCells& cells_;
-  std::vector<size_t> first_;  // of a patch's sums
-  std::vector<Sum> sums_;      // patch by patch, level by level, row by row
+  std::vector<uint32_t> first_;  // of a patch's sums; kNone: it is not among patches_
+  std::vector<Sum> sums_;        // patch by patch, level by level, row by row
   std::vector<Spot> patches_;
 };
 

@@ -17,11 +17,12 @@ constexpr float kLeastBrighter = 1.5f;  // reflected by a spot, over what the ti
 constexpr float kAlbedo = 0.5f;         // of what no ray has met yet
 constexpr float kMostAimed = 0.4f;      // share of the rays: what no photon saw, as the sky, has to be found too
 constexpr float kShareStep = 0.05f;
-constexpr double kWorth = 0.2;    // variance of rays that meet the spots by chance, over the square of the tile's light
-constexpr double kLarge = 0.5;    // half a side over the distance: it is divided
-constexpr double kUneven = 2;     // mean square over square of the mean: likewise
-constexpr uint32_t kProbes = 4;   // a spot
-constexpr float kGrazing = 0.1f;  // half sides: a spot in the texel's plane is not quite flat
+constexpr double kWorth = 0.2;  // variance of rays that meet the spots by chance, over the square of the tile's light
+constexpr float kLarge = 0.5f;  // half a side over the distance: it is divided
+constexpr float kUneven = 2;    // typical irradiance over the mean: likewise
+constexpr float kNeedle = 1e-30f;  // square of half a side [m^2]
+constexpr uint32_t kProbes = 4;    // a spot
+constexpr float kGrazing = 0.1f;   // half sides: a spot in the texel's plane is not quite flat
 
 double Square(float x) { return static_cast<double>(x) * static_cast<double>(x); }
 
@@ -72,7 +73,7 @@ float TileSpots::Ball::SquareDistance(Vec3f position) const {
 // patches on.
 std::vector<PyramidSpot> TileSpots::Brightest(const BrightnessPyramid& pyramid, const Ball& tile, float least) {
   struct Candidate {
-    double variance;  // in proportion
+    float variance;  // in proportion
     PyramidSpot spot;
     bool operator<(const Candidate& other) const {
       return std::tie(variance, other.spot.square) < std::tie(other.variance, spot.square);
@@ -80,14 +81,14 @@ std::vector<PyramidSpot> TileSpots::Brightest(const BrightnessPyramid& pyramid, 
   };
   std::vector<Candidate> heap;
   const auto consider = [&](const PyramidSpot& spot) {
-    const Vec3f d = tile.center - spot.place.center;
-    if (Dot(d, spot.place.normal) + tile.radius + std::sqrt(spot.place.area) <= 0) return false;
-    heap.push_back(
-        {spot.light.square / static_cast<double>(tile.SquareDistance(spot.place.center) + spot.place.area), spot});
+    const BrightnessPyramid::Place& place = spot.place;
+    if (!(std::min(Dot(place.u, place.u), Dot(place.v, place.v)) > kNeedle)) return false;
+    if (Dot(tile.center - place.center, place.normal) + tile.radius + std::sqrt(place.area) <= 0) return false;
+    heap.push_back({spot.light.square / (tile.SquareDistance(place.center) + place.area), spot});
     return true;
   };
   for (const PyramidSpot& patch : pyramid.patches()) {
-    if (!(patch.light.Typical() > static_cast<double>(least))) break;
+    if (!(patch.light.Typical() > least)) break;
     consider(patch);
   }
   std::make_heap(heap.begin(), heap.end());
@@ -96,9 +97,9 @@ std::vector<PyramidSpot> TileSpots::Brightest(const BrightnessPyramid& pyramid, 
     std::pop_heap(heap.begin(), heap.end());
     const PyramidSpot spot = heap.back().spot;
     heap.pop_back();
-    const auto area = static_cast<double>(spot.place.area);
-    const bool large = area > 4 * kLarge * kLarge * static_cast<double>(tile.SquareDistance(spot.place.center));
-    const bool uneven = spot.light.square * area > kUneven * spot.light.flux * spot.light.flux;
+    const float area = spot.place.area;
+    const bool large = area > 4 * kLarge * kLarge * tile.SquareDistance(spot.place.center);
+    const bool uneven = spot.light.Typical() > kUneven * spot.light.flux / area;
     if (spot.square.level == 0 || !(large || uneven)) {
       found.push_back(spot);
       continue;
@@ -106,7 +107,7 @@ std::vector<PyramidSpot> TileSpots::Brightest(const BrightnessPyramid& pyramid, 
     parts.clear();
     pyramid.Split(spot.square, parts);
     for (const PyramidSpot& part : parts) {
-      if (part.light.Typical() > static_cast<double>(least) && consider(part)) std::push_heap(heap.begin(), heap.end());
+      if (part.light.Typical() > least && consider(part)) std::push_heap(heap.begin(), heap.end());
     }
   }
   // In an order that does not turn on the last digit of anything.
@@ -124,8 +125,8 @@ TileSpots::TileSpots(const GatherScene& scene, const BrightnessPyramid& pyramid,
   for (const PyramidSpot& found : Brightest(pyramid, tile, kLeastBrighter * expected / kAlbedo)) {
     const Probed probed = Probe(scene, pyramid, found, map, texels, key, counters);
     if (probed.seen == 0) continue;
-    const float seen = static_cast<float>(probed.seen),
-                reflected = static_cast<float>(found.light.flux) / found.place.area * probed.albedo / seen;
+    const float seen = static_cast<float>(probed.seen), albedo = probed.albedo / seen;
+    const float reflected = found.light.flux / found.place.area * albedo;
     const float visible = seen / static_cast<float>(probed.tried);
     const float distance2 = tile.SquareDistance(found.place.center) + found.place.area;
     variance += Square(reflected) * static_cast<double>(visible * found.place.area / distance2 * kInvPiF);
